@@ -1,0 +1,19 @@
+#define _POSIX_C_SOURCE 200809L
+#include "base/clock.h"
+
+#include <sys/resource.h>
+#include <time.h>
+
+double lx_seconds(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+uint64_t lx_peak_memory(void)
+{
+    struct rusage usage;
+    if (getrusage(RUSAGE_SELF, &usage) != 0) return 0;
+    return (uint64_t)usage.ru_maxrss * 1024u; // Linux counts kibibytes
+}

@@ -1,0 +1,303 @@
+#define _GNU_SOURCE // renameat2
+#include "base/file.h"
+
+#include "base/error.h"
+#include "base/memory.h"
+
+#include <ctype.h>
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+void lx_bytes_release(lx_bytes *bytes)
+{
+    lx_free(bytes->data);
+    *bytes = (lx_bytes){0};
+}
+
+// A missing or unreadable input is the input's fault, the rest is the machine's.
+static lx_result fail_errno(lx_error *error, const char *what)
+{
+    const int code = errno;
+    const bool input = code == ENOENT || code == ENOTDIR || code == EACCES || code == EISDIR || code == ELOOP ||
+                       code == ENAMETOOLONG;
+    return lx_fail(error, input ? LX_ERROR_FORMAT : LX_ERROR_IO, "%s: %s", what, strerror(code));
+}
+
+lx_result lx_file_read(const char *path, size_t limit, lx_bytes *out, lx_error *error)
+{
+    lx_result result = LX_OK;
+    uint8_t *data = NULL;
+    const int file = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK); // O_NONBLOCK: never hang on a pipe
+    if (file < 0) return fail_errno(error, "cannot read");
+    struct stat info;
+    if (fstat(file, &info) != 0) {
+        result = fail_errno(error, "cannot read");
+        goto cleanup;
+    }
+    if (S_ISDIR(info.st_mode)) {
+        result = lx_fail(error, LX_ERROR_FORMAT, "cannot read: is a folder");
+        goto cleanup;
+    }
+    if (!S_ISREG(info.st_mode)) {
+        result = lx_fail(error, LX_ERROR_FORMAT, "cannot read: not a regular file");
+        goto cleanup;
+    }
+    if ((uint64_t)info.st_size > limit) {
+        result = lx_fail(error, LX_ERROR_LIMIT, "file of %llu bytes is larger than the limit of %zu",
+                         (unsigned long long)info.st_size, limit);
+        goto cleanup;
+    }
+    const size_t size = (size_t)info.st_size;
+    data = lx_malloc_array(size, 1);
+    if (!data) {
+        result = lx_fail_memory(error, "file");
+        goto cleanup;
+    }
+    size_t done = 0;
+    while (done < size) {
+        const ssize_t count = read(file, data + done, size - done);
+        if (count < 0 && errno == EINTR) continue;
+        if (count < 0) {
+            result = fail_errno(error, "cannot read");
+            goto cleanup;
+        }
+        if (count == 0) break; // it shrank while we read
+        done += (size_t)count;
+    }
+    *out = (lx_bytes){data, done};
+    data = NULL;
+cleanup:
+    lx_free(data);
+    close(file);
+    return result;
+}
+
+static lx_result flush_folder_of(const char *path)
+{
+    char *folder = lx_path_folder(path);
+    if (!folder) return LX_ERROR_OUT_OF_MEMORY;
+    const int handle = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (handle >= 0) {
+        fsync(handle);
+        close(handle);
+    }
+    lx_free(folder);
+    return LX_OK;
+}
+
+lx_result lx_file_write(const char *path, const void *data, size_t size, lx_error *error)
+{
+    lx_result result = LX_OK;
+    int file = -1;
+    bool created = false;
+    char *temporary = lx_format("%s.tmp%ld", path, (long)getpid());
+    if (!temporary) return lx_fail_memory(error, "path");
+    file = open(temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
+    if (file < 0) {
+        result = lx_fail(error, LX_ERROR_IO, "cannot write: %s", strerror(errno));
+        goto cleanup;
+    }
+    created = true;
+    for (size_t done = 0; done < size;) {
+        const ssize_t count = write(file, (const char *)data + done, size - done);
+        if (count < 0 && errno == EINTR) continue;
+        if (count <= 0) {
+            result = lx_fail(error, LX_ERROR_IO, "cannot write: %s", strerror(errno));
+            goto cleanup;
+        }
+        done += (size_t)count;
+    }
+    const bool flushed = fsync(file) == 0;
+    const int flush_errno = errno;
+    const bool closed = close(file) == 0;
+    file = -1;
+    if (!flushed || !closed || rename(temporary, path) != 0) {
+        result = lx_fail(error, LX_ERROR_IO, "cannot write: %s", strerror(flushed ? errno : flush_errno));
+        goto cleanup;
+    }
+    created = false;
+    flush_folder_of(path);
+cleanup:
+    if (file >= 0) close(file);
+    if (created) unlink(temporary);
+    lx_free(temporary);
+    return result;
+}
+
+bool lx_path_exists(const char *path)
+{
+    struct stat info;
+    return lstat(path, &info) == 0;
+}
+
+bool lx_path_is_folder(const char *path)
+{
+    struct stat info;
+    return stat(path, &info) == 0 && S_ISDIR(info.st_mode);
+}
+
+bool lx_path_is_link(const char *path)
+{
+    struct stat info;
+    return lstat(path, &info) == 0 && S_ISLNK(info.st_mode);
+}
+
+char *lx_path_join(const char *folder, const char *name)
+{
+    const size_t length = strlen(folder);
+    return lx_format("%s%s%s", folder, length && folder[length - 1] == '/' ? "" : "/", name);
+}
+
+char *lx_path_folder(const char *path)
+{
+    size_t length = strlen(path);
+    while (length > 1 && path[length - 1] == '/') --length;
+    while (length > 0 && path[length - 1] != '/') --length;
+    while (length > 1 && path[length - 1] == '/') --length;
+    return length == 0 ? lx_strdup(".") : lx_strndup(path, length);
+}
+
+const char *lx_path_name(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    return slash ? slash + 1 : path;
+}
+
+void lx_path_extension(const char *path, char out[8])
+{
+    const char *dot = strrchr(lx_path_name(path), '.');
+    size_t length = 0;
+    if (dot)
+        for (++dot; dot[length] && length < 7; ++length) out[length] = (char)tolower((unsigned char)dot[length]);
+    out[length] = '\0';
+    if (dot && dot[length]) out[0] = '\0'; // longer than any we know
+}
+
+bool lx_path_is_inside(const char *path, const char *folder)
+{
+    char *real = realpath(path, NULL);
+    char *base = realpath(folder, NULL);
+    bool inside = false;
+    if (real && base) {
+        const size_t length = strlen(base);
+        inside = strncmp(real, base, length) == 0 && (real[length] == '/' || (length == 1 && base[0] == '/'));
+    }
+    free(real);
+    free(base);
+    return inside;
+}
+
+lx_result lx_folder_create(const char *path, lx_error *error)
+{
+    if (mkdir(path, 0777) == 0) return LX_OK;
+    if (errno == EEXIST && lx_path_is_folder(path)) return LX_OK;
+    return lx_fail(error, LX_ERROR_IO, "cannot create folder %s: %s", path, strerror(errno));
+}
+
+static int remove_below(int parent, const char *name, int depth)
+{
+    if (depth > 64) {
+        errno = ELOOP;
+        return -1;
+    }
+    const int handle = openat(parent, name, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+    if (handle < 0) return unlinkat(parent, name, 0);
+    DIR *folder = fdopendir(handle);
+    if (!folder) {
+        close(handle);
+        return -1;
+    }
+    int status = 0;
+    for (struct dirent *entry; status == 0 && (entry = readdir(folder)) != NULL;) {
+        if (strcmp(entry->d_name, ".") == 0 || strcmp(entry->d_name, "..") == 0) continue;
+        status = remove_below(handle, entry->d_name, depth + 1);
+    }
+    closedir(folder);
+    return status == 0 ? unlinkat(parent, name, AT_REMOVEDIR) : status;
+}
+
+lx_result lx_folder_remove(const char *path, lx_error *error)
+{
+    if (remove_below(AT_FDCWD, path, 0) == 0 || errno == ENOENT) return LX_OK;
+    return lx_fail(error, LX_ERROR_IO, "cannot remove %s: %s", path, strerror(errno));
+}
+
+lx_result lx_folder_swap(const char *fresh, const char *path, lx_error *error)
+{
+    lx_result result = LX_OK;
+    char *old = NULL;
+    if (!lx_path_exists(path)) {
+        if (rename(fresh, path) != 0)
+            return lx_fail(error, LX_ERROR_IO, "cannot rename %s: %s", fresh, strerror(errno));
+        return flush_folder_of(path);
+    }
+    if (renameat2(AT_FDCWD, fresh, AT_FDCWD, path, RENAME_EXCHANGE) == 0) {
+        flush_folder_of(path);
+        return lx_folder_remove(fresh, error); // which now holds the old content
+    }
+    old = lx_format("%s.old%ld", path, (long)getpid());
+    if (!old) return lx_fail_memory(error, "path");
+    if (rename(path, old) != 0) {
+        result = lx_fail(error, LX_ERROR_IO, "cannot rename %s: %s", path, strerror(errno));
+    } else if (rename(fresh, path) != 0) {
+        result = lx_fail(error, LX_ERROR_IO, "cannot rename %s: %s", fresh, strerror(errno));
+        if (rename(old, path) != 0)
+            result = lx_fail(error, LX_ERROR_IO, "the earlier result now lies in %s: %s", old, strerror(errno));
+    } else {
+        flush_folder_of(path);
+        result = lx_folder_remove(old, error);
+    }
+    lx_free(old);
+    return result;
+}
+
+static int compare_names(const void *a, const void *b)
+{
+    return strcmp(*(char *const *)a, *(char *const *)b);
+}
+
+lx_result lx_folder_list(const char *path, void (*func)(void *user, const char *name), void *user, lx_error *error)
+{
+    DIR *folder = opendir(path);
+    if (!folder) return fail_errno(error, "cannot read folder");
+    lx_result result = LX_OK;
+    char **names = NULL;
+    size_t count = 0, capacity = 0;
+    for (struct dirent *entry; (entry = readdir(folder)) != NULL;) {
+        if (strcmp(entry->d_name, ".") == 0 || strcmp(entry->d_name, "..") == 0) continue;
+        char *copy = lx_strdup(entry->d_name);
+        if (!copy || !lx_array_reserve(&names, &capacity, count + 1, sizeof *names)) {
+            lx_free(copy);
+            result = lx_fail_memory(error, "folder listing");
+            break;
+        }
+        names[count++] = copy;
+    }
+    closedir(folder);
+    if (count) qsort(names, count, sizeof *names, compare_names);
+    for (size_t i = 0; i < count; ++i) {
+        if (result == LX_OK) func(user, names[i]);
+        lx_free(names[i]);
+    }
+    lx_free(names);
+    return result;
+}
+
+bool lx_is_terminal(FILE *stream)
+{
+    return isatty(fileno(stream)) == 1;
+}
+
+int lx_terminal_columns(void)
+{
+    struct winsize size;
+    if (ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0) return size.ws_col;
+    return 80;
+}
