@@ -1,0 +1,47 @@
+/// A bake in progress and its result, as the files of this folder share it.
+#ifndef LX_BAKE_BAKE_H
+#define LX_BAKE_BAKE_H
+
+#include "luxel/bake.h"
+#include "scene/atlas.h"
+#include "trace/tracer.h"
+
+/// What one vector of colours drives. Members: the sources whose lx_source_use.layer is this layer.
+typedef struct lx_layer {
+    char *name;          ///< Owned.
+    lx_source_kind kind; ///< Of its first source.
+    const char *node;    ///< Name of the first source's node ("" for the sky); borrowed from the scene.
+    const char *unit;    ///< "cd", "lx", "nt" as in glTF and Khronos texts: candela, lux, nit.
+    lx_light_mode mode;
+    float color[3];      ///< c = color × intensity at authored strength.
+    float intensity;
+    uint32_t source_count;
+} lx_layer;
+
+struct lx_bake {
+    const lx_scene *scene; ///< Borrowed.
+    const lx_atlas *atlas; ///< Borrowed.
+    lx_bake_desc desc;     ///< Strings inside are borrowed from the caller.
+    lx_tracer *tracer;
+
+    lx_layer *layers;
+    uint32_t layer_count;
+
+    /// T of every layer: image (page * layer_count + layer), page_size² × RGB floats, row 0 first. Unit light: lux per cd, lx or nt
+    /// (for `combined`: lux). After lx_bake_run padding is filled by dilation.
+    float *texels;
+    /// Chart that owns a texel, [page_count][page_size²], numbered over the whole atlas; LX_NO_CHART: empty. With dilation's claims.
+    uint32_t *texel_chart;
+    /// Share of a texel's square that surfaces cover, 0…255, [page_count][page_size²]; 0: none (padding or empty).
+    uint8_t *texel_coverage;
+
+    lx_bake_summary summary;
+};
+
+static inline float *lx_bake_image(const lx_bake *bake, uint32_t page, uint32_t layer)
+{
+    const size_t texel_count = (size_t)bake->atlas->page_size * bake->atlas->page_size;
+    return bake->texels + 3 * texel_count * ((size_t)page * bake->layer_count + layer);
+}
+
+#endif

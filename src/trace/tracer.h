@@ -1,0 +1,65 @@
+/// Batches of rays against a scene, and what they hit.
+///
+/// Arrays of rays in, arrays of hits or transmittances out; shading is a second batch step. Embree sits behind accel.h alone.
+#ifndef LX_TRACE_TRACER_H
+#define LX_TRACE_TRACER_H
+
+#include "luxel/bake.h"
+#include "scene/scene.h"
+
+#define LX_MISS UINT32_MAX
+
+/// Points origin + t · direction with t in (t_min, t_max). `direction` needs no unit length; t counts in its lengths.
+typedef struct lx_ray {
+    lx_vec3 origin;
+    float t_min;
+    lx_vec3 direction;
+    float t_max;
+} lx_ray;
+
+typedef struct lx_hit {
+    uint32_t surface;  ///< Index into the scene's surfaces, LX_MISS for none.
+    uint32_t triangle; ///< Of the surface's primitive.
+    float t;
+    float u, v;        ///< Barycentrics: position = (1-u-v) p0 + u p1 + v p2 over the primitive's corners in index order.
+} lx_hit;
+
+/// A hit as light transport sees it (spec: surfaces). Colours are linear.
+typedef struct lx_shading {
+    lx_vec3 position;         ///< On the triangle, world.
+    lx_vec3 geometric_normal; ///< Unit, front side.
+    lx_vec3 normal;           ///< Interpolated vertex normal, unit, on the geometric normal's side.
+    bool front;               ///< The ray came to the front side.
+    bool lit;                 ///< This side scatters and is not black: front, or double-sided.
+    lx_rgb albedo;            ///< Diffuse reflectance of what is opaque of it, at most 0.99.
+    lx_rgb transmittance;     ///< Share of light that passes straight on; 0 for opaque surfaces.
+    lx_rgb emission;          ///< Radiance in nit towards the ray's origin at unit factor and strength (texture alone); 0 if none.
+} lx_shading;
+
+typedef struct lx_tracer lx_tracer;
+
+/// Builds the acceleration structure and the tables for sampling sources. `include_dynamic`: non-static instances are in it
+/// (pictures); else they are not there at all (bakes). The sky is read from transport->sky.
+lx_result lx_tracer_create(const lx_scene *scene, const lx_transport_desc *transport, bool include_dynamic, lx_tracer **out_tracer,
+                           lx_error *error);
+void lx_tracer_destroy(lx_tracer *tracer);
+
+const lx_scene *lx_tracer_scene(const lx_tracer *tracer);
+/// Sources of the scene, then the sky if there is one (kind LX_SOURCE_SKY, name "sky").
+uint32_t lx_tracer_source_count(const lx_tracer *tracer);
+const lx_source *lx_tracer_source(const lx_tracer *tracer, uint32_t index);
+/// Radiance of the sky at unit intensity and white tint in a direction (picture alone); black without a sky.
+lx_rgb lx_tracer_sky_radiance(const lx_tracer *tracer, lx_vec3 direction);
+
+/// Nearest hits. Cutouts are seen through; blended and transmitting surfaces are hits. Thread-safe.
+void lx_trace_closest(const lx_tracer *tracer, const lx_ray *rays, lx_hit *hits, size_t count);
+/// How much light passes each ray: product over crossed surfaces, each triangle once. Thread-safe.
+void lx_trace_transmittance(const lx_tracer *tracer, const lx_ray *rays, lx_rgb *transmittance, size_t count);
+/// Shades hits; misses are skipped. Thread-safe.
+void lx_shade_hits(const lx_tracer *tracer, const lx_ray *rays, const lx_hit *hits, lx_shading *shading, size_t count);
+
+/// A ray's origin moved off its surface to the side of `normal` (unit, geometric) by a few roundings of the coordinates.
+/// Based on: [WachterBinder2019] "A Fast and Robust Method for Avoiding Self-Intersection", Ray Tracing Gems, ch. 6.
+lx_vec3 lx_offset_origin(lx_vec3 position, lx_vec3 normal);
+
+#endif
