@@ -46,6 +46,8 @@ lx_image_format lx_image_sniff(const void *data, size_t size);
 /// EXR: scanline or tiled single-part images with channels R G B (A) or Y, half or float, any compression OpenEXRCore reads;
 /// the data window decides the size.
 lx_result lx_image_decode(const void *data, size_t size, lx_image *out, lx_error *error);
+/// The same with a lower limit on width × height.
+lx_result lx_image_decode_limited(const void *data, size_t size, uint64_t max_pixels, lx_image *out, lx_error *error);
 
 /// Reads and decodes a file of at most 1 GiB. Messages do not repeat the path.
 lx_result lx_image_load(const char *path, lx_image *out, lx_error *error);
