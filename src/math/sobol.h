@@ -33,31 +33,34 @@ static inline uint32_t lx_owen_scramble(uint32_t x, uint32_t seed)
     return lx_reverse_bits(lx_owen_reversed(lx_reverse_bits(x), seed));
 }
 
-/// Second Sobol dimension (the first is the bit reversal of the index): Pascal matrix modulo 2, built by prefix XORs.
-static inline uint32_t lx_sobol_second(uint32_t index)
+/// Bits of the second Sobol dimension, lowest first (the first dimension is the index itself): the index times Pascal's triangle
+/// modulo 2, which is a Kronecker power of (1 1; 0 1) (Lucas' theorem) and so takes one step per level, not one per bit.
+static inline uint32_t lx_sobol_second_reversed(uint32_t index)
 {
-    // The generator matrix of dimension 2, applied to the index's bits: v_k = v_{k-1} ^ (v_{k-1} >> 1).
-    uint32_t result = 0;
-    for (uint32_t v = 1u << 31; index; index >>= 1, v ^= v >> 1)
-        if (index & 1u) result ^= v;
-    return result;
+    index ^= (index >> 1) & 0x55555555u;
+    index ^= (index >> 2) & 0x33333333u;
+    index ^= (index >> 4) & 0x0f0f0f0fu;
+    index ^= (index >> 8) & 0x00ff00ffu;
+    index ^= (index >> 16) & 0x0000ffffu;
+    return index;
 }
 
 /// Point `index` of the stream `key`, in [0,1)². Different keys give independent streams; within a key the first 2^k points
 /// are a (0,k,2)-net, so stratified in every way.
 static inline lx_vec2 lx_sobol_pair(uint32_t index, uint32_t key)
 {
+    // Scrambling works on reversed digits, which is how both dimensions arrive: each needs one reversal, at the end.
     const uint32_t shuffled = lx_owen_scramble(index, lx_hash32(key));
-    const uint32_t x = lx_owen_scramble(lx_reverse_bits(shuffled), lx_hash32(key ^ 0x5bd1e995u));
-    const uint32_t y = lx_owen_scramble(lx_sobol_second(shuffled), lx_hash32(key ^ 0x1b873593u));
-    return (lx_vec2){lx_unit_float(x), lx_unit_float(y)};
+    const uint32_t x = lx_owen_reversed(shuffled, lx_hash32(key ^ 0x5bd1e995u));
+    const uint32_t y = lx_owen_reversed(lx_sobol_second_reversed(shuffled), lx_hash32(key ^ 0x1b873593u));
+    return (lx_vec2){lx_unit_float(lx_reverse_bits(x)), lx_unit_float(lx_reverse_bits(y))};
 }
 
 /// One-dimensional version: the scrambled van der Corput sequence.
 static inline float lx_sobol_one(uint32_t index, uint32_t key)
 {
     const uint32_t shuffled = lx_owen_scramble(index, lx_hash32(key));
-    return lx_unit_float(lx_owen_scramble(lx_reverse_bits(shuffled), lx_hash32(key ^ 0x5bd1e995u)));
+    return lx_unit_float(lx_reverse_bits(lx_owen_reversed(shuffled, lx_hash32(key ^ 0x5bd1e995u))));
 }
 
 #endif

@@ -31,8 +31,9 @@ typedef struct lx_shading {
     lx_vec3 normal;           ///< Interpolated vertex normal, unit, on the geometric normal's side.
     bool front;               ///< The ray came to the front side.
     bool lit;                 ///< This side scatters and is not black: front, or double-sided.
-    lx_rgb albedo;            ///< Diffuse reflectance of what is opaque of it, at most 0.99.
-    lx_rgb transmittance;     ///< Share of light that passes straight on; 0 for opaque surfaces.
+    float opacity;            ///< Share of light that meets the diffuse surface; 1 for opaque ones.
+    lx_rgb albedo;            ///< Diffuse reflectance of that share, at most 0.99.
+    lx_rgb transmittance;     ///< Share of light that passes straight on; 0 for opaque surfaces. opacity + transmittance <= 1.
     lx_rgb emission;          ///< Radiance in nit towards the ray's origin at unit factor and strength (texture alone); 0 if none.
 } lx_shading;
 
@@ -61,5 +62,12 @@ void lx_shade_hits(const lx_tracer *tracer, const lx_ray *rays, const lx_hit *hi
 /// A ray's origin moved off its surface to the side of `normal` (unit, geometric) by a few roundings of the coordinates.
 /// Based on: [WachterBinder2019] "A Fast and Robust Method for Avoiding Self-Intersection", Ray Tracing Gems, ch. 6.
 lx_vec3 lx_offset_origin(lx_vec3 position, lx_vec3 normal);
+
+/// Lets the ray go on behind a hit: t_min moves past hit.t by a few roundings. The same triangle may still be hit once more;
+/// callers that count crossings skip it.
+void lx_ray_step_past(lx_ray *ray, const lx_hit *hit);
+
+/// Instruction set of the ray tracing kernel, for the record.
+const char *lx_tracer_isa(const lx_tracer *tracer);
 
 #endif

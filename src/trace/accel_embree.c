@@ -1,0 +1,266 @@
+// Embree 3 behind accel.h.
+//
+// Shadow rays go through Embree's stream entry point in batches, which runs about twice as fast as ray by ray; closest hits go
+// one by one, which loses little and always computes the same t for the same ray and triangle. The BVH has medium quality (the
+// high-quality one hurts any-hit queries) and is built by one thread: its topology decides ties between triangles at equal
+// distance, and the same input must give the same bits.
+#include "trace/accel.h"
+
+#include "base/error.h"
+
+#include <embree3/rtcore.h>
+#include <string.h>
+
+struct lx_accel {
+    RTCDevice device;
+    RTCScene scene;
+    lx_accel_surface_queries queries;
+    bool any_filter;
+    char isa[16];
+};
+
+enum { batch_size = 256, remembered_triangles = 12 };
+
+// What a shadow ray has crossed so far. Embree may report one triangle to a filter more than once (a BVH with spatial splits
+// or a stream that is replayed), so triangles that were counted are remembered.
+typedef struct crossing {
+    lx_rgb transmittance;
+    uint32_t count;
+    bool overflow; // more surfaces than the list holds: the ray is walked again, one closest hit at a time
+    struct { uint32_t mesh, triangle; } seen[remembered_triangles];
+} crossing;
+
+typedef struct ray_context {
+    struct RTCIntersectContext embree; // first: Embree hands a pointer to it to the filters
+    const lx_accel *accel;
+    crossing *crossings; // by ray id
+} ray_context;
+
+// Embree hands hits and rays to filters as arrays of fields; its accessors exist for C++ only.
+static unsigned hit_mesh(const struct RTCFilterFunctionNArguments *a, unsigned i)
+{
+    return ((const unsigned *)a->hit)[6 * a->N + i];
+}
+
+static unsigned hit_triangle(const struct RTCFilterFunctionNArguments *a, unsigned i)
+{
+    return ((const unsigned *)a->hit)[5 * a->N + i];
+}
+
+static float hit_u(const struct RTCFilterFunctionNArguments *a, unsigned i)
+{
+    return ((const float *)a->hit)[3 * a->N + i];
+}
+
+static float hit_v(const struct RTCFilterFunctionNArguments *a, unsigned i)
+{
+    return ((const float *)a->hit)[4 * a->N + i];
+}
+
+static unsigned ray_id(const struct RTCFilterFunctionNArguments *a, unsigned i)
+{
+    return ((const unsigned *)a->ray)[10 * a->N + i];
+}
+
+// Closest hits: lets rays through the holes of cutouts.
+static void filter_closest(const struct RTCFilterFunctionNArguments *arguments)
+{
+    const ray_context *context = (const ray_context *)arguments->context;
+    const lx_accel_surface_queries *queries = &context->accel->queries;
+    for (unsigned i = 0; i < arguments->N; ++i) {
+        if (arguments->valid[i] != -1) continue;
+        if (queries->is_hole(queries->user, hit_mesh(arguments, i), hit_triangle(arguments, i), hit_u(arguments, i),
+                             hit_v(arguments, i)))
+            arguments->valid[i] = 0;
+    }
+}
+
+// Returns true if the crossed triangle lets some light pass, and accounts for it.
+static bool cross(const lx_accel *accel, crossing *state, unsigned mesh, unsigned triangle, float u, float v)
+{
+    for (uint32_t k = 0; k < state->count; ++k)
+        if (state->seen[k].mesh == mesh && state->seen[k].triangle == triangle) return true;
+    const lx_rgb passed = accel->queries.transmittance(accel->queries.user, mesh, triangle, u, v);
+    if (lx_rgb_is_black(passed)) return false;
+    if (state->count == remembered_triangles) {
+        state->overflow = true;
+        return true;
+    }
+    state->seen[state->count].mesh = mesh;
+    state->seen[state->count].triangle = triangle;
+    ++state->count;
+    state->transmittance = lx_rgb_mul(state->transmittance, passed);
+    return true;
+}
+
+static void filter_occluded(const struct RTCFilterFunctionNArguments *arguments)
+{
+    const ray_context *context = (const ray_context *)arguments->context;
+    for (unsigned i = 0; i < arguments->N; ++i) {
+        if (arguments->valid[i] != -1) continue;
+        if (cross(context->accel, &context->crossings[ray_id(arguments, i)], hit_mesh(arguments, i),
+                  hit_triangle(arguments, i), hit_u(arguments, i), hit_v(arguments, i)))
+            arguments->valid[i] = 0;
+    }
+}
+
+static lx_result fail_embree(const lx_accel *accel, lx_error *error)
+{
+    const enum RTCError code = rtcGetDeviceError(accel->device);
+    if (code == RTC_ERROR_OUT_OF_MEMORY) return lx_fail_memory(error, "ray tracing structure");
+    return lx_fail(error, LX_ERROR_BACKEND, "Embree failed with error %d", (int)code);
+}
+
+static lx_result attach_mesh(lx_accel *accel, uint32_t index, const lx_accel_mesh *mesh, lx_error *error)
+{
+    if (mesh->triangle_count == 0) return LX_OK;
+    RTCGeometry geometry = rtcNewGeometry(accel->device, RTC_GEOMETRY_TYPE_TRIANGLE);
+    if (!geometry) return fail_embree(accel, error);
+    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, mesh->vertices, 0, sizeof(lx_vec3),
+                               mesh->vertex_count);
+    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh->indices, 0,
+                               3 * sizeof(uint32_t), mesh->triangle_count);
+    if (mesh->has_holes) rtcSetGeometryIntersectFilterFunction(geometry, filter_closest);
+    if (mesh->has_holes || mesh->transmits) {
+        rtcSetGeometryOccludedFilterFunction(geometry, filter_occluded);
+        accel->any_filter = true;
+    }
+    rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_MEDIUM);
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometryByID(accel->scene, geometry, index);
+    rtcReleaseGeometry(geometry);
+    return rtcGetDeviceError(accel->device) == RTC_ERROR_NONE ? LX_OK : fail_embree(accel, error);
+}
+
+static void record_isa(lx_accel *accel)
+{
+    // Embree tells widths, not names: 16-wide native packets mean AVX-512, 8-wide AVX or AVX2.
+    const char *name = rtcGetDeviceProperty(accel->device, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED)  ? "avx512"
+                       : rtcGetDeviceProperty(accel->device, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) ? "avx2"
+                                                                                                      : "sse2";
+    strcpy(accel->isa, name);
+}
+
+lx_result lx_accel_create(const lx_accel_mesh *meshes, uint32_t mesh_count, lx_accel_surface_queries queries,
+                          const char *isa, lx_accel **out_accel, lx_error *error)
+{
+    lx_result result = LX_OK;
+    lx_accel *accel = lx_calloc_array(1, sizeof *accel);
+    if (!accel) return lx_fail_memory(error, "ray tracing structure");
+    accel->queries = queries;
+    char config[64] = "threads=1,set_affinity=0";
+    if (isa[0]) {
+        strcat(config, ",isa=");
+        strcat(config, isa);
+    }
+    accel->device = rtcNewDevice(config);
+    if (!accel->device) {
+        result = lx_fail(error, LX_ERROR_BACKEND, "Embree cannot start%s%s", isa[0] ? " with instruction set " : "", isa);
+        goto cleanup;
+    }
+    record_isa(accel);
+    if (isa[0]) strcpy(accel->isa, isa);
+    accel->scene = rtcNewScene(accel->device);
+    rtcSetSceneFlags(accel->scene, RTC_SCENE_FLAG_ROBUST); // watertight: no light through shared edges
+    rtcSetSceneBuildQuality(accel->scene, RTC_BUILD_QUALITY_MEDIUM);
+    for (uint32_t i = 0; i < mesh_count; ++i) LX_TRY(attach_mesh(accel, i, &meshes[i], error));
+    rtcCommitScene(accel->scene);
+    if (rtcGetDeviceError(accel->device) != RTC_ERROR_NONE) {
+        result = fail_embree(accel, error);
+        goto cleanup;
+    }
+    *out_accel = accel;
+    accel = NULL;
+cleanup:
+    lx_accel_destroy(accel);
+    return result;
+}
+
+void lx_accel_destroy(lx_accel *accel)
+{
+    if (!accel) return;
+    if (accel->scene) rtcReleaseScene(accel->scene);
+    if (accel->device) rtcReleaseDevice(accel->device);
+    lx_free(accel);
+}
+
+const char *lx_accel_isa(const lx_accel *accel)
+{
+    return accel->isa;
+}
+
+static ray_context make_context(const lx_accel *accel, crossing *crossings)
+{
+    ray_context context = {.accel = accel, .crossings = crossings};
+    rtcInitIntersectContext(&context.embree);
+    return context;
+}
+
+static struct RTCRay make_ray(const lx_ray *ray, unsigned id)
+{
+    return (struct RTCRay){.org_x = ray->origin.x, .org_y = ray->origin.y, .org_z = ray->origin.z, .tnear = ray->t_min,
+                           .dir_x = ray->direction.x, .dir_y = ray->direction.y, .dir_z = ray->direction.z,
+                           .tfar = ray->t_max, .mask = 0xffffffffu, .id = id};
+}
+
+static lx_hit intersect_one(const lx_accel *accel, ray_context *context, const lx_ray *ray)
+{
+    struct RTCRayHit query = {.ray = make_ray(ray, 0)};
+    query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    rtcIntersect1(accel->scene, &context->embree, &query);
+    return (lx_hit){.surface = query.hit.geomID, .triangle = query.hit.primID, .t = query.ray.tfar, .u = query.hit.u,
+                    .v = query.hit.v};
+}
+
+void lx_accel_closest(const lx_accel *accel, const lx_ray *rays, lx_hit *hits, size_t count)
+{
+    ray_context context = make_context(accel, NULL);
+    for (size_t i = 0; i < count; ++i) hits[i] = intersect_one(accel, &context, &rays[i]);
+}
+
+// Exact for any number of surfaces: one closest hit after the other.
+static lx_rgb walk_transmittance(const lx_accel *accel, lx_ray ray)
+{
+    ray_context context = make_context(accel, NULL);
+    lx_rgb product = {1, 1, 1};
+    lx_hit last = {.surface = LX_MISS};
+    for (;;) {
+        const lx_hit hit = intersect_one(accel, &context, &ray);
+        if (hit.surface == LX_MISS) return product;
+        if (hit.surface != last.surface || hit.triangle != last.triangle) {
+            product = lx_rgb_mul(product, accel->queries.transmittance(accel->queries.user, hit.surface, hit.triangle, hit.u, hit.v));
+            if (lx_rgb_is_black(product)) return product;
+        }
+        last = hit;
+        lx_ray_step_past(&ray, &hit);
+    }
+}
+
+void lx_accel_transmittance(const lx_accel *accel, const lx_ray *rays, lx_rgb *transmittance, size_t count)
+{
+    crossing crossings[batch_size];
+    struct RTCRay queries[batch_size];
+    for (size_t first = 0; first < count; first += batch_size) {
+        const size_t batch = count - first < batch_size ? count - first : (size_t)batch_size;
+        for (size_t i = 0; i < batch; ++i) queries[i] = make_ray(&rays[first + i], (unsigned)i);
+        if (accel->any_filter)
+            for (size_t i = 0; i < batch; ++i) {
+                crossings[i].transmittance = (lx_rgb){1, 1, 1};
+                crossings[i].count = 0;
+                crossings[i].overflow = false;
+            }
+        ray_context context = make_context(accel, crossings);
+        rtcOccluded1M(accel->scene, &context.embree, queries, (unsigned)batch, sizeof(struct RTCRay));
+        for (size_t i = 0; i < batch; ++i) {
+            if (queries[i].tfar < 0)
+                transmittance[first + i] = (lx_rgb){0, 0, 0};
+            else if (!accel->any_filter)
+                transmittance[first + i] = (lx_rgb){1, 1, 1};
+            else if (crossings[i].overflow)
+                transmittance[first + i] = walk_transmittance(accel, rays[first + i]);
+            else
+                transmittance[first + i] = crossings[i].transmittance;
+        }
+    }
+}

@@ -1,0 +1,242 @@
+// Emissive triangles: tables for choosing points by area × brightness.
+//
+// A source's triangles are chosen by their power. A textured triangle is cut by a regular grid of its barycentrics, fine enough that a
+// piece covers some two texels across; each piece is chosen by its mean brightness, but never by less than a small share of the
+// triangle's, because the estimate of a piece may miss what lies between its lookups.
+#include "trace/emitters.h"
+
+#include "base/error.h"
+#include "trace/sampling.h"
+#include "trace/tracer_data.h"
+
+enum { max_grid = 64, lookups_per_edge = 3 };
+static const float least_share = 0.02f; // of a triangle's mean brightness, for every piece
+
+static float brightness_of(lx_rgb c)
+{
+    return (c.r + c.g + c.b) * (1.0f / 3);
+}
+
+// Barycentrics of a piece: cell (i, j) of the grid, lower (k = 0) or upper (k = 1) half, at local coordinates (a, b), a + b <= 1.
+static lx_vec2 piece_point(uint32_t grid, uint32_t i, uint32_t j, uint32_t k, float a, float b)
+{
+    const float n = (float)grid;
+    return k == 0 ? (lx_vec2){((float)i + a) / n, ((float)j + b) / n}
+                  : (lx_vec2){((float)(i + 1) - a) / n, ((float)(j + 1) - b) / n};
+}
+
+// Lower halves lie inside where i + j < n, upper ones where i + j < n - 1.
+static bool piece_is_inside(uint32_t grid, uint32_t i, uint32_t j, uint32_t k)
+{
+    return i + j + k < grid;
+}
+
+static float mean_brightness(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, uint32_t grid, uint32_t i,
+                             uint32_t j, uint32_t k)
+{
+    // Centres of a small grid folded into the triangle.
+    float sum = 0;
+    for (int y = 0; y < lookups_per_edge; ++y)
+        for (int x = 0; x < lookups_per_edge; ++x) {
+            float a = ((float)x + 0.5f) / lookups_per_edge, b = ((float)y + 0.5f) / lookups_per_edge;
+            if (a + b > 1) {
+                a = 1 - a;
+                b = 1 - b;
+            }
+            const lx_vec2 uv = piece_point(grid, i, j, k, a, b);
+            sum += brightness_of(lx_surface_emission(tracer, surface, triangle, uv.x, uv.y));
+        }
+    return sum / (lookups_per_edge * lookups_per_edge);
+}
+
+// Texels along the longest edge of the triangle in its emissive texture, halved.
+static uint32_t choose_grid(const lx_tracer *tracer, uint32_t surface, uint32_t triangle)
+{
+    const lx_scene *scene = tracer->scene;
+    const lx_surface *s = &scene->surfaces[surface];
+    const lx_texture_slot *slot = &scene->materials[s->material].emissive_texture;
+    if (slot->texture < 0 || scene->textures[slot->texture].image < 0) return 1;
+    const lx_image *image = &scene->images[scene->textures[slot->texture].image];
+    const lx_primitive *primitive = &scene->primitives[s->primitive];
+    const lx_vec2 *uvs = primitive->texcoords[slot->texcoord];
+    if (!uvs) return 1;
+    const uint32_t *corner = primitive->indices + 3 * (size_t)triangle;
+    float longest = 0;
+    for (int e = 0; e < 3; ++e) {
+        const lx_vec2 d = lx_sub2(uvs[corner[(e + 1) % 3]], uvs[corner[e]]);
+        const float du = (slot->m[0] * d.x + slot->m[1] * d.y) * (float)image->width;
+        const float dv = (slot->m[3] * d.x + slot->m[4] * d.y) * (float)image->height;
+        longest = fmaxf(longest, sqrtf(du * du + dv * dv));
+    }
+    const float pieces = ceilf(longest * 0.5f);
+    return pieces < 1 ? 1 : pieces < max_grid ? (uint32_t)pieces : (uint32_t)max_grid;
+}
+
+// Fills the piece table of one triangle; returns its mean brightness.
+static lx_result build_pieces(const lx_tracer *tracer, lx_emitters *emitters, size_t *capacity, lx_emitter_triangle *t,
+                              float *out_mean, lx_error *error)
+{
+    const uint32_t n = t->grid;
+    if (n == 1) {
+        *out_mean = mean_brightness(tracer, t->surface, t->triangle, 1, 0, 0, 0);
+        return LX_OK;
+    }
+    const size_t entries = 2 * (size_t)n * n;
+    if (emitters->piece_count + entries + 1 > UINT32_MAX ||
+        !lx_array_reserve(&emitters->piece_cdf, capacity, emitters->piece_count + entries + 1, sizeof(float)))
+        return lx_fail_memory(error, "emitters");
+    t->first_cdf = (uint32_t)emitters->piece_count;
+    float *cdf = emitters->piece_cdf + t->first_cdf;
+    emitters->piece_count += entries + 1;
+    double sum = 0;
+    for (uint32_t i = 0, e = 0; i < n; ++i)
+        for (uint32_t j = 0; j < n; ++j)
+            for (uint32_t k = 0; k < 2; ++k, ++e) {
+                cdf[e + 1] = piece_is_inside(n, i, j, k) ? mean_brightness(tracer, t->surface, t->triangle, n, i, j, k) : 0;
+                sum += (double)cdf[e + 1];
+            }
+    const double mean = sum / ((double)n * n); // n² pieces lie inside
+    double running = 0;
+    const double floor_value = mean * (double)least_share;
+    cdf[0] = 0;
+    for (uint32_t i = 0, e = 0; i < n; ++i)
+        for (uint32_t j = 0; j < n; ++j)
+            for (uint32_t k = 0; k < 2; ++k, ++e) {
+                if (piece_is_inside(n, i, j, k)) running += fmax((double)cdf[e + 1], floor_value);
+                cdf[e + 1] = (float)running;
+            }
+    if (running > 0)
+        for (size_t e = 1; e <= entries; ++e) cdf[e] = (float)((double)cdf[e] / running);
+    *out_mean = (float)mean;
+    return LX_OK;
+}
+
+static lx_result add_surface(lx_tracer *tracer, lx_emitters *emitters, size_t *triangle_capacity, size_t *piece_capacity,
+                             uint32_t surface, lx_error *error)
+{
+    const lx_primitive *primitive = &tracer->scene->primitives[tracer->scene->surfaces[surface].primitive];
+    const size_t first = emitters->triangle_count;
+    if (first + primitive->triangle_count > UINT32_MAX ||
+        !lx_array_reserve(&emitters->triangles, triangle_capacity, first + primitive->triangle_count,
+                          sizeof *emitters->triangles))
+        return lx_fail_memory(error, "emitters");
+    tracer->surfaces[surface].first_emitter_triangle = (uint32_t)first;
+    emitters->triangle_count += primitive->triangle_count;
+    for (uint32_t i = 0; i < primitive->triangle_count; ++i) {
+        lx_emitter_triangle *t = &emitters->triangles[first + i];
+        lx_vec3 p[3];
+        lx_triangle_corners(tracer, surface, i, p);
+        *t = (lx_emitter_triangle){.surface = surface, .triangle = i};
+        t->area = 0.5f * lx_length(lx_cross(lx_sub(p[1], p[0]), lx_sub(p[2], p[0])));
+        t->grid = t->area > 0 ? choose_grid(tracer, surface, i) : 1;
+        float mean = 0;
+        const lx_result result = build_pieces(tracer, emitters, piece_capacity, t, &mean, error);
+        if (result != LX_OK) return result;
+        t->probability = mean * t->area; // power for now; divided by the source's below
+    }
+    return LX_OK;
+}
+
+lx_result lx_emitters_build(lx_tracer *tracer, lx_error *error)
+{
+    const lx_scene *scene = tracer->scene;
+    lx_emitters *emitters = &tracer->emitters;
+    size_t triangle_capacity = 0, piece_capacity = 0;
+    emitters->first_triangle = lx_calloc_array((size_t)scene->source_count + 1, sizeof(uint32_t));
+    if (!emitters->first_triangle) return lx_fail_memory(error, "emitters");
+    for (uint32_t source = 0; source < scene->source_count; ++source) {
+        emitters->first_triangle[source] = (uint32_t)emitters->triangle_count;
+        if (scene->sources[source].kind != LX_SOURCE_EMISSIVE) continue;
+        for (uint32_t s = 0; s < scene->surface_count; ++s) {
+            if (scene->surfaces[s].source != (int32_t)source || !tracer->surfaces[s].positions) continue;
+            const lx_result result = add_surface(tracer, emitters, &triangle_capacity, &piece_capacity, s, error);
+            if (result != LX_OK) return result;
+        }
+    }
+    emitters->first_triangle[scene->source_count] = (uint32_t)emitters->triangle_count;
+    emitters->triangle_cdf = lx_calloc_array(emitters->triangle_count + scene->source_count, sizeof(float));
+    if (!emitters->triangle_cdf) return lx_fail_memory(error, "emitters");
+    for (uint32_t source = 0; source < scene->source_count; ++source) {
+        const uint32_t first = emitters->first_triangle[source], end = emitters->first_triangle[source + 1];
+        double total = 0;
+        for (uint32_t i = first; i < end; ++i) total += (double)emitters->triangles[i].probability;
+        float *cdf = emitters->triangle_cdf + first + source;
+        double running = 0;
+        for (uint32_t i = first; i < end; ++i) {
+            lx_emitter_triangle *t = &emitters->triangles[i];
+            running += (double)t->probability;
+            t->probability = total > 0 ? (float)((double)t->probability / total) : 0;
+            cdf[i - first + 1] = total > 0 ? (float)(running / total) : 0;
+        }
+    }
+    return LX_OK;
+}
+
+void lx_emitters_release(lx_emitters *emitters)
+{
+    lx_free(emitters->triangles);
+    lx_free(emitters->triangle_cdf);
+    lx_free(emitters->piece_cdf);
+    lx_free(emitters->first_triangle);
+    *emitters = (lx_emitters){0};
+}
+
+// Step of a running sum that u falls into; u becomes its place within the step.
+static uint32_t choose(const float *cdf, uint32_t count, float *u)
+{
+    uint32_t low = 0, high = count;
+    while (high - low > 1) {
+        const uint32_t middle = low + (high - low) / 2;
+        if (cdf[middle] <= *u)
+            low = middle;
+        else
+            high = middle;
+    }
+    const float width = cdf[low + 1] - cdf[low];
+    *u = width > 0 ? lx_clamp((*u - cdf[low]) / width, 0, 0x1.fffffep-1f) : 0.5f;
+    return low;
+}
+
+bool lx_emitters_sample(const lx_emitters *emitters, uint32_t source, lx_vec2 u, lx_emitter_sample *out)
+{
+    const uint32_t first = emitters->first_triangle[source], count = emitters->first_triangle[source + 1] - first;
+    const float *cdf = emitters->triangle_cdf + first + source;
+    if (count == 0 || !(cdf[count] > 0)) return false;
+    const lx_emitter_triangle *t = &emitters->triangles[first + choose(cdf, count, &u.x)];
+    if (!(t->probability > 0)) return false;
+    *out = (lx_emitter_sample){.surface = t->surface, .triangle = t->triangle, .pdf_area = t->probability / t->area};
+    if (t->grid == 1) {
+        const lx_vec2 b = lx_sample_triangle(u);
+        out->u = b.x;
+        out->v = b.y;
+        return true;
+    }
+    const uint32_t n = t->grid, entries = 2 * n * n;
+    const float *pieces = emitters->piece_cdf + t->first_cdf;
+    const uint32_t e = choose(pieces, entries, &u.x);
+    const lx_vec2 local = lx_sample_triangle(u);
+    const lx_vec2 b = piece_point(n, e / 2 / n, e / 2 % n, e % 2, local.x, local.y);
+    out->u = b.x;
+    out->v = b.y;
+    out->pdf_area *= (pieces[e + 1] - pieces[e]) * (float)(n * n);
+    return out->pdf_area > 0;
+}
+
+float lx_emitters_pdf_area(const lx_emitters *emitters, uint32_t index, float u, float v)
+{
+    const lx_emitter_triangle *t = &emitters->triangles[index];
+    if (!(t->probability > 0)) return 0;
+    const float uniform = t->probability / t->area;
+    if (t->grid == 1) return uniform;
+    const uint32_t n = t->grid;
+    const float x = lx_clamp(u, 0, 1) * (float)n, y = lx_clamp(v, 0, 1) * (float)n;
+    uint32_t i = (uint32_t)x, j = (uint32_t)y;
+    if (i >= n) i = n - 1;
+    if (j >= n) j = n - 1;
+    uint32_t k = (x - (float)i) + (y - (float)j) > 1 ? 1 : 0;
+    if (!piece_is_inside(n, i, j, k)) k = 0; // a hit on the long edge, rounded outwards
+    if (!piece_is_inside(n, i, j, k)) return 0;
+    const uint32_t e = (i * n + j) * 2 + k;
+    const float *pieces = emitters->piece_cdf + t->first_cdf;
+    return uniform * (pieces[e + 1] - pieces[e]) * (float)(n * n);
+}

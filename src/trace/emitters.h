@@ -1,0 +1,42 @@
+/// Emissive triangles, ready to be sampled by area and brightness.
+#ifndef LX_TRACE_EMITTERS_H
+#define LX_TRACE_EMITTERS_H
+
+#include "scene/scene.h"
+
+/// One triangle of an emissive source. Textured ones are cut into grid² × 2 pieces of equal area (half of the table's entries lie
+/// outside the triangle and weigh nothing), so that bright texels get more samples.
+typedef struct lx_emitter_triangle {
+    uint32_t surface, triangle;
+    float probability; ///< Of being chosen within its source.
+    float area;        ///< m²
+    uint32_t grid;     ///< Pieces per edge; 1: uniform, no table.
+    uint32_t first_cdf; ///< Into piece_cdf: 2 grid² + 1 entries, if grid > 1.
+} lx_emitter_triangle;
+
+typedef struct lx_emitters {
+    lx_emitter_triangle *triangles; ///< Grouped by source.
+    float *triangle_cdf;            ///< [triangle_count + source_count]; per source its triangles' running sum, starting at 0.
+    float *piece_cdf;
+    uint32_t *first_triangle;       ///< [source_count + 1]
+    size_t triangle_count, piece_count;
+} lx_emitters;
+
+typedef struct lx_emitter_sample {
+    uint32_t surface, triangle;
+    float u, v;
+    float pdf_area; ///< Density per m² within the source.
+} lx_emitter_sample;
+
+struct lx_tracer;
+
+/// Reads the surfaces of `tracer` and fills tracer->emitters.
+lx_result lx_emitters_build(struct lx_tracer *tracer, lx_error *error);
+void lx_emitters_release(lx_emitters *emitters);
+
+/// Chooses a point of a source. False if the source has nothing bright.
+bool lx_emitters_sample(const lx_emitters *emitters, uint32_t source, lx_vec2 u, lx_emitter_sample *out);
+/// The density with which lx_emitters_sample chooses that point. `index` is the emitter triangle's number.
+float lx_emitters_pdf_area(const lx_emitters *emitters, uint32_t index, float u, float v);
+
+#endif

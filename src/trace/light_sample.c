@@ -1,0 +1,230 @@
+// Next-event estimation, one function per kind of source.
+//
+// Lamps (point, spot, directional, rectangle, disk) are invisible to rays, so their samples carry the whole weight. Emissive surfaces
+// and sky pictures can also be hit; samples and hits share the weight by the power heuristic of Veach 1997, section 9.2.4.
+// Rectangles are sampled by solid angle ([Urena2013]); disks through their bounding square, points outside it count 0, which keeps the
+// density bounded right up to the disk. Spheres by their visible cap ([PBR4] 6.2.4).
+#include "trace/light_sample.h"
+
+#include "trace/sampling.h"
+#include "trace/tracer_data.h"
+
+float lx_range_factor(float distance, float range)
+{
+    if (!(range > 0)) return 1;
+    const float ratio = distance / range, ratio2 = ratio * ratio;
+    return lx_clamp(1 - ratio2 * ratio2, 0, 1);
+}
+
+float lx_spot_factor(const lx_light *light, float cosine)
+{
+    const float cos_inner = cosf(light->inner_angle), cos_outer = cosf(light->outer_angle);
+    const float scale = 1 / fmaxf(1e-4f, cos_inner - cos_outer);
+    const float attenuation = lx_clamp((cosine - cos_outer) * scale, 0, 1);
+    return attenuation * attenuation;
+}
+
+static float power_heuristic(float pdf_a, float pdf_b)
+{
+    if (!(pdf_a < INFINITY)) return 1;
+    const float a = pdf_a * pdf_a, b = pdf_b * pdf_b;
+    return a + b > 0 && a < INFINITY ? a / (a + b) : 1;
+}
+
+// Cosine at the receiver; 0 from below either normal.
+static float receiver_cosine(const lx_receiver *r, lx_vec3 direction)
+{
+    const float cosine = lx_dot(r->normal, direction);
+    return cosine > 0 && lx_dot(r->geometric_normal, direction) > 0 ? cosine : 0;
+}
+
+static lx_vec3 ray_origin(const lx_receiver *r)
+{
+    return lx_offset_origin(r->position, r->geometric_normal);
+}
+
+// From the receiver to a point in space.
+static lx_ray ray_to_point(const lx_receiver *r, lx_vec3 target)
+{
+    const lx_vec3 origin = ray_origin(r);
+    return (lx_ray){.origin = origin, .t_min = 0, .direction = lx_sub(target, origin), .t_max = 1};
+}
+
+static lx_ray ray_to_infinity(const lx_receiver *r, lx_vec3 direction)
+{
+    return (lx_ray){.origin = ray_origin(r), .t_min = 0, .direction = direction, .t_max = INFINITY};
+}
+
+// Factors that depend on the receiver's place as seen from the lamp's centre.
+static float lamp_factor(const lx_light *light, lx_vec3 to_lamp, float distance)
+{
+    float factor = lx_range_factor(distance, light->range);
+    if (light->kind == LX_LIGHT_SPOT) factor *= lx_spot_factor(light, -lx_dot(light->direction, to_lamp) / distance);
+    return factor;
+}
+
+// Point and spot. E = I cos(theta) / d² for a point; a sphere of radiance I / (pi r²) else.
+static bool sample_point(const lx_light *light, const lx_receiver *r, lx_vec2 u, lx_ray *ray, float *irradiance)
+{
+    const lx_vec3 to_centre = lx_sub(light->position, r->position);
+    const float distance2 = lx_dot(to_centre, to_centre), distance = sqrtf(distance2);
+    if (!(distance > light->radius)) return false;
+    const float factor = lamp_factor(light, to_centre, distance);
+    if (factor == 0) return false;
+    const lx_vec3 axis = lx_scale(to_centre, 1 / distance);
+    if (light->radius == 0) {
+        *irradiance = factor * receiver_cosine(r, axis) / distance2;
+        if (*irradiance == 0) return false;
+        *ray = ray_to_point(r, light->position);
+        return true;
+    }
+    const float sine2 = light->radius * light->radius / distance2; // of the cap's half angle
+    const float one_minus_cos = sine2 / (1 + sqrtf(1 - sine2));
+    const lx_vec3 local = lx_sample_cone(u, one_minus_cos);
+    const lx_vec3 direction = lx_to_world(axis, local);
+    const float cosine = receiver_cosine(r, direction);
+    if (cosine == 0) return false;
+    const float radiance = 1 / (LX_PI * light->radius * light->radius);
+    *irradiance = factor * radiance * cosine * 2 * LX_PI * one_minus_cos;
+    // The near side of the sphere along the direction.
+    const float across2 = distance2 * fmaxf(0, 1 - local.z * local.z);
+    const float near = distance * local.z - sqrtf(fmaxf(0, light->radius * light->radius - across2));
+    *ray = ray_to_point(r, lx_mad(r->position, direction, near));
+    return true;
+}
+
+// E = illuminance · cos; with an angular diameter a disk of radiance E / (pi sin²(angle / 2)).
+static bool sample_directional(const lx_light *light, const lx_receiver *r, lx_vec2 u, lx_ray *ray, float *irradiance)
+{
+    lx_vec3 direction = lx_neg(light->direction);
+    if (light->radius == 0) {
+        *irradiance = receiver_cosine(r, direction);
+    } else {
+        const float half = light->radius / 2, sine = sinf(half);
+        const float one_minus_cos = 2 * sinf(half / 2) * sinf(half / 2);
+        direction = lx_to_world(direction, lx_sample_cone(u, one_minus_cos));
+        *irradiance = receiver_cosine(r, direction) * 2 * one_minus_cos / (sine * sine);
+    }
+    if (*irradiance == 0) return false;
+    *ray = ray_to_infinity(r, direction);
+    return true;
+}
+
+// One-sided rectangle or disk of unit radiance.
+static bool sample_area(const lx_light *light, const lx_receiver *r, lx_vec2 u, lx_ray *ray, float *irradiance)
+{
+    const lx_vec3 to_centre = lx_sub(light->position, r->position);
+    const float height = -lx_dot(to_centre, light->direction); // of the receiver above the lamp's plane
+    if (!(height > 0)) return false;
+    const float factor = lx_range_factor(lx_length(to_centre), light->range);
+    if (factor == 0) return false;
+    const float half_width = lx_length(light->axis_x), half_depth = lx_length(light->axis_y);
+    if (!(half_width > 0) || !(half_depth > 0)) return false;
+    const lx_vec3 x = lx_scale(light->axis_x, 1 / half_width), y = lx_scale(light->axis_y, 1 / half_depth);
+    const lx_vec3 corner = {lx_dot(to_centre, x) - half_width, lx_dot(to_centre, y) - half_depth, height};
+    const lx_spherical_rectangle rectangle = lx_spherical_rectangle_of(corner, 2 * half_width, 2 * half_depth);
+    lx_vec2 place; // on the lamp, from its centre, in half edges
+    float density; // 1 / pdf_solid_angle, without the cosine at the lamp when sampled by area
+    if (rectangle.solid_angle > 1e-4) {
+        const lx_vec3 p = lx_sample_spherical_rectangle(&rectangle, u);
+        place = (lx_vec2){(p.x - corner.x) / half_width - 1, (p.y - corner.y) / half_depth - 1};
+        density = (float)rectangle.solid_angle;
+    } else { // too small for the angles' precision, and far enough for areas to do as well
+        place = (lx_vec2){2 * u.x - 1, 2 * u.y - 1};
+        density = 0;
+    }
+    if (light->kind == LX_LIGHT_DISK && lx_dot2(place, place) > 1) return false;
+    const lx_vec3 target =
+        lx_add(light->position, lx_add(lx_scale(light->axis_x, place.x), lx_scale(light->axis_y, place.y)));
+    const lx_vec3 to_target = lx_sub(target, r->position);
+    const float distance = lx_length(to_target);
+    const lx_vec3 direction = lx_scale(to_target, 1 / distance);
+    if (density == 0) density = 4 * half_width * half_depth * (height / distance) / (distance * distance);
+    *irradiance = factor * receiver_cosine(r, direction) * density;
+    if (*irradiance == 0) return false;
+    *ray = ray_to_point(r, target);
+    return true;
+}
+
+static lx_vec3 triangle_normal(const lx_vec3 corner[3])
+{
+    return lx_normalize_or(lx_cross(lx_sub(corner[1], corner[0]), lx_sub(corner[2], corner[0])), (lx_vec3){0, 0, 0});
+}
+
+static bool sample_emissive(const lx_tracer *tracer, uint32_t source, const lx_receiver *r, lx_vec2 u, lx_ray *ray,
+                            lx_rgb *irradiance)
+{
+    lx_emitter_sample s;
+    if (!lx_emitters_sample(&tracer->emitters, source, u, &s)) return false;
+    lx_vec3 corner[3];
+    lx_triangle_corners(tracer, s.surface, s.triangle, corner);
+    const lx_vec3 point = lx_add(lx_add(lx_scale(corner[0], 1 - s.u - s.v), lx_scale(corner[1], s.u)), lx_scale(corner[2], s.v));
+    lx_vec3 normal = lx_scale(triangle_normal(corner), tracer->surfaces[s.surface].orientation);
+    const lx_vec3 to_point = lx_sub(point, r->position);
+    const float distance2 = lx_dot(to_point, to_point);
+    if (!(distance2 > 0)) return false;
+    const lx_vec3 direction = lx_scale(to_point, 1 / sqrtf(distance2));
+    float emitter_cosine = -lx_dot(normal, direction);
+    if (emitter_cosine < 0 && tracer->scene->materials[tracer->scene->surfaces[s.surface].material].double_sided) {
+        emitter_cosine = -emitter_cosine;
+        normal = lx_neg(normal);
+    }
+    const float cosine = receiver_cosine(r, direction);
+    if (!(emitter_cosine > 0) || cosine == 0) return false;
+    const lx_rgb emission = lx_surface_emission(tracer, s.surface, s.triangle, s.u, s.v);
+    if (lx_rgb_is_black(emission)) return false;
+    const float pdf = s.pdf_area * distance2 / emitter_cosine; // solid angle
+    const float weight = power_heuristic(pdf, cosine / LX_PI);
+    *irradiance = lx_rgb_scale(emission, weight * cosine / pdf);
+    *ray = ray_to_point(r, lx_offset_origin(point, normal));
+    return true;
+}
+
+static bool sample_sky(const lx_tracer *tracer, const lx_receiver *r, lx_vec2 u, lx_ray *ray, lx_rgb *irradiance)
+{
+    if (!lx_sky_has_samples(&tracer->sky)) return false;
+    float pdf;
+    const lx_vec3 direction = lx_sky_sample(&tracer->sky, u, &pdf);
+    const float cosine = receiver_cosine(r, direction);
+    if (!(pdf > 0) || cosine == 0) return false;
+    const float weight = power_heuristic(pdf, cosine / LX_PI);
+    *irradiance = lx_rgb_scale(lx_sky_radiance(&tracer->sky, direction), weight * cosine / pdf);
+    if (lx_rgb_is_black(*irradiance)) return false;
+    *ray = ray_to_infinity(r, direction);
+    return true;
+}
+
+bool lx_sample_source(const lx_tracer *tracer, uint32_t source, const lx_receiver *receiver, lx_vec2 u, lx_ray *out_ray,
+                      lx_rgb *out_irradiance)
+{
+    const lx_source *s = lx_tracer_source(tracer, source);
+    if (s->kind == LX_SOURCE_SKY) return sample_sky(tracer, receiver, u, out_ray, out_irradiance);
+    if (s->kind == LX_SOURCE_EMISSIVE) return sample_emissive(tracer, source, receiver, u, out_ray, out_irradiance);
+    const lx_light *light = &tracer->scene->lights[s->light];
+    float irradiance = 0;
+    bool arrives = false;
+    switch (light->kind) {
+    case LX_LIGHT_POINT:
+    case LX_LIGHT_SPOT: arrives = sample_point(light, receiver, u, out_ray, &irradiance); break;
+    case LX_LIGHT_DIRECTIONAL: arrives = sample_directional(light, receiver, u, out_ray, &irradiance); break;
+    case LX_LIGHT_RECT:
+    case LX_LIGHT_DISK: arrives = sample_area(light, receiver, u, out_ray, &irradiance); break;
+    }
+    *out_irradiance = lx_rgb_grey(irradiance);
+    return arrives;
+}
+
+float lx_hit_weight(const lx_tracer *tracer, const lx_ray *ray, const lx_hit *hit, lx_vec3 hit_normal, float cosine)
+{
+    const uint32_t index = tracer->surfaces[hit->surface].first_emitter_triangle + hit->triangle;
+    const float pdf_area = lx_emitters_pdf_area(&tracer->emitters, index, hit->u, hit->v);
+    const float emitter_cosine = fabsf(lx_dot(hit_normal, ray->direction)); // directions of such rays are unit
+    const float pdf = emitter_cosine > 0 ? pdf_area * hit->t * hit->t / emitter_cosine : 0;
+    return power_heuristic(cosine / LX_PI, pdf);
+}
+
+float lx_sky_weight(const lx_tracer *tracer, lx_vec3 direction, float cosine)
+{
+    if (!lx_sky_has_samples(&tracer->sky)) return 1;
+    return power_heuristic(cosine / LX_PI, lx_sky_pdf(&tracer->sky, direction));
+}

@@ -1,0 +1,30 @@
+/// Light from one source at one point: next-event estimation.
+#ifndef LX_TRACE_LIGHT_SAMPLE_H
+#define LX_TRACE_LIGHT_SAMPLE_H
+
+#include "trace/tracer.h"
+
+/// A place that receives light. Normals are unit and on the same side.
+typedef struct lx_receiver {
+    lx_vec3 position;         ///< On the surface.
+    lx_vec3 normal;           ///< Interpolated: of the cosine.
+    lx_vec3 geometric_normal; ///< Light from below it does not count.
+} lx_receiver;
+
+/// One sample of the irradiance that source `source` (of strength 1 and white colour) would give without occluders, and the shadow ray
+/// that decides. Range, spot cone, receiver's cosine, 1/pdf and, for sources that rays can hit (emissive surfaces, pictures of
+/// skies), the power-heuristic weight against cosine-weighted rays are in it. False: nothing arrives, no ray.
+bool lx_sample_source(const lx_tracer *tracer, uint32_t source, const lx_receiver *receiver, lx_vec2 u, lx_ray *out_ray,
+                      lx_rgb *out_irradiance);
+
+/// Weight of an emissive hit found by a cosine-weighted ray from `receiver`, against lx_sample_source. `cosine`: of the ray at the receiver.
+float lx_hit_weight(const lx_tracer *tracer, const lx_ray *ray, const lx_hit *hit, lx_vec3 hit_normal, float cosine);
+/// The same for a ray that left the scene. `direction` is unit.
+float lx_sky_weight(const lx_tracer *tracer, lx_vec3 direction, float cosine);
+
+/// Smooth cut-off at a light's range (KHR_lights_punctual): clamp(1 - (d / range)^4, 0, 1); range 0: 1.
+float lx_range_factor(float distance, float range);
+/// KHR_lights_punctual's angular attenuation of a spot, squared. `cosine`: between the spot's axis and the direction to the receiver.
+float lx_spot_factor(const lx_light *light, float cosine);
+
+#endif

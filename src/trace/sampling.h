@@ -1,0 +1,72 @@
+/// Directions and points by density. Every function states its pdf and measure.
+///
+/// Based on: [PBR4] Pharr, Jakob, Humphreys, "Physically Based Rendering", 4th ed., appendix A.5;
+/// [Urena2013] Ureña, Fajardo, King, "An Area-Preserving Parametrization for Spherical Rectangles", EGSR 2013.
+#ifndef LX_TRACE_SAMPLING_H
+#define LX_TRACE_SAMPLING_H
+
+#include "math/vec.h"
+
+/// Uniform on the unit disk (concentric map, [PBR4] A.5.1). pdf_area = 1 / pi.
+static inline lx_vec2 lx_sample_disk(lx_vec2 u)
+{
+    const float x = 2 * u.x - 1, y = 2 * u.y - 1;
+    if (x == 0 && y == 0) return (lx_vec2){0, 0};
+    float radius, theta;
+    if (fabsf(x) > fabsf(y)) {
+        radius = x;
+        theta = LX_PI / 4 * (y / x);
+    } else {
+        radius = y;
+        theta = LX_PI / 2 - LX_PI / 4 * (x / y);
+    }
+    return (lx_vec2){radius * cosf(theta), radius * sinf(theta)};
+}
+
+/// Cosine-weighted direction around +Z (Malley's method, [PBR4] A.5.3). pdf_solid_angle = cos(theta) / pi.
+static inline lx_vec3 lx_sample_cosine_hemisphere(lx_vec2 u)
+{
+    const lx_vec2 d = lx_sample_disk(u);
+    return (lx_vec3){d.x, d.y, sqrtf(fmaxf(0.0f, 1 - d.x * d.x - d.y * d.y))};
+}
+
+/// Uniform direction within a cone around +Z, given 1 - cos(half angle), which keeps its precision for narrow cones.
+/// pdf_solid_angle = 1 / (2 pi one_minus_cos).
+static inline lx_vec3 lx_sample_cone(lx_vec2 u, float one_minus_cos)
+{
+    const float height = u.x * one_minus_cos; // 1 - cos(theta)
+    const float sine = sqrtf(fmaxf(0.0f, height * (2 - height)));
+    const float phi = 2 * LX_PI * u.y;
+    return (lx_vec3){sine * cosf(phi), sine * sinf(phi), 1 - height};
+}
+
+/// From the frame whose +Z is `n` to the world.
+static inline lx_vec3 lx_to_world(lx_vec3 n, lx_vec3 local)
+{
+    lx_vec3 t, b;
+    lx_tangent_frame(n, &t, &b);
+    return lx_add(lx_add(lx_scale(t, local.x), lx_scale(b, local.y)), lx_scale(n, local.z));
+}
+
+/// Barycentrics (of the second and third corner), uniform over a triangle's area ([PBR4] A.5.2, square-root form).
+static inline lx_vec2 lx_sample_triangle(lx_vec2 u)
+{
+    const float root = sqrtf(u.x);
+    return (lx_vec2){root * (1 - u.y), root * u.y};
+}
+
+/// A rectangle as seen from a point: what [Urena2013] needs to sample it by solid angle. Double precision: for small rectangles the four
+/// dihedral angles all but cancel.
+typedef struct lx_spherical_rectangle {
+    double solid_angle;
+    double x0, y0, x1, y1, z0;
+    double b0, b1, k;
+} lx_spherical_rectangle;
+
+/// `corner` is the lower left corner relative to the viewer in a frame whose axes are the edges' unit directions and their cross product.
+lx_spherical_rectangle lx_spherical_rectangle_of(lx_vec3 corner, float width, float height);
+
+/// Point on the rectangle, same frame, relative to the viewer. pdf_solid_angle = 1 / solid_angle.
+lx_vec3 lx_sample_spherical_rectangle(const lx_spherical_rectangle *r, lx_vec2 u);
+
+#endif

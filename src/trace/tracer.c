@@ -1,0 +1,348 @@
+// A scene made ready for rays: world-space triangles, the acceleration structure, sampling tables; shading of hits.
+#include "trace/tracer.h"
+
+#include "base/error.h"
+#include "math/hash.h"
+#include "trace/tracer_data.h"
+
+#include <string.h>
+
+static const float largest_albedo = 0.99f; // keeps light finite in closed white rooms
+
+// ---- surfaces --------------------------------------------------------------------------------------------------------
+
+typedef struct surface_point {
+    const lx_primitive *primitive;
+    const uint32_t *corner;
+    float w0, u, v;
+} surface_point;
+
+static surface_point point_of(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, float u, float v)
+{
+    const lx_primitive *primitive = &tracer->scene->primitives[tracer->scene->surfaces[surface].primitive];
+    return (surface_point){primitive, primitive->indices + 3 * (size_t)triangle, 1 - u - v, u, v};
+}
+
+static lx_vec2 texcoord_at(const surface_point *p, const lx_texture_slot *slot)
+{
+    const lx_vec2 *uvs = p->primitive->texcoords[slot->texcoord];
+    if (!uvs) return (lx_vec2){0, 0};
+    const lx_vec2 a = uvs[p->corner[0]], b = uvs[p->corner[1]], c = uvs[p->corner[2]];
+    return (lx_vec2){p->w0 * a.x + p->u * b.x + p->v * c.x, p->w0 * a.y + p->u * b.y + p->v * c.y};
+}
+
+static lx_vec4 sample_slot(const lx_tracer *tracer, const surface_point *p, const lx_texture_slot *slot, bool srgb)
+{
+    if (slot->texture < 0) return (lx_vec4){1, 1, 1, 1};
+    return lx_texture_sample(tracer->scene, slot, texcoord_at(p, slot), srgb);
+}
+
+// Base colour and alpha: factor × texture × vertex colour.
+static lx_vec4 base_color_at(const lx_tracer *tracer, const lx_material *m, const surface_point *p)
+{
+    const lx_vec4 t = sample_slot(tracer, p, &m->base_color_texture, true);
+    lx_vec4 c = {t.x * m->base_color.r, t.y * m->base_color.g, t.z * m->base_color.b, t.w * m->base_alpha};
+    if (p->primitive->colors) {
+        const lx_vec4 *colors = p->primitive->colors;
+        const lx_vec4 a = colors[p->corner[0]], b = colors[p->corner[1]], d = colors[p->corner[2]];
+        c.x *= p->w0 * a.x + p->u * b.x + p->v * d.x;
+        c.y *= p->w0 * a.y + p->u * b.y + p->v * d.y;
+        c.z *= p->w0 * a.z + p->u * b.z + p->v * d.z;
+        c.w *= p->w0 * a.w + p->u * b.w + p->v * d.w;
+    }
+    return (lx_vec4){lx_clamp(c.x, 0, 1), lx_clamp(c.y, 0, 1), lx_clamp(c.z, 0, 1), lx_clamp(c.w, 0, 1)};
+}
+
+static const lx_material *material_of(const lx_tracer *tracer, uint32_t surface)
+{
+    return &tracer->scene->materials[tracer->scene->surfaces[surface].material];
+}
+
+// How much a surface hides: alpha as its mode says, 0 in a hole.
+static float alpha_at(const lx_tracer *tracer, uint32_t surface, const lx_material *m, float alpha)
+{
+    if (m->alpha_mode == LX_ALPHA_BLEND || tracer->scene->surfaces[surface].transparent) return alpha;
+    if (m->alpha_mode == LX_ALPHA_MASK) return alpha >= m->alpha_cutoff ? 1 : 0;
+    return 1;
+}
+
+// Splits light that meets a surface into a diffuse share (opacity) and what passes straight on.
+static void split_light(const lx_tracer *tracer, uint32_t surface, const lx_material *m, const surface_point *p, lx_vec4 base,
+                        float *opacity, lx_rgb *transmittance)
+{
+    const float alpha = alpha_at(tracer, surface, m, base.w);
+    float transmission = m->transmission;
+    if (transmission > 0) transmission *= sample_slot(tracer, p, &m->transmission_texture, false).x;
+    *opacity = alpha * (1 - transmission);
+    const lx_rgb tint = {base.x, base.y, base.z};
+    // What passes beside the pigment is white, or tinted on request; what passes through glass is tinted by the glass.
+    lx_rgb beside = lx_rgb_grey(1 - alpha);
+    if (tracer->coloured_shadows && alpha > 0) beside = lx_rgb_scale(tint, 1 - alpha);
+    *transmittance = lx_rgb_add(beside, lx_rgb_scale(tint, alpha * transmission));
+}
+
+static bool is_hole(void *user, uint32_t surface, uint32_t triangle, float u, float v)
+{
+    const lx_tracer *tracer = user;
+    const lx_material *m = material_of(tracer, surface);
+    const surface_point p = point_of(tracer, surface, triangle, u, v);
+    return alpha_at(tracer, surface, m, base_color_at(tracer, m, &p).w) == 0;
+}
+
+static lx_rgb transmittance_at(void *user, uint32_t surface, uint32_t triangle, float u, float v)
+{
+    const lx_tracer *tracer = user;
+    if (tracer->surfaces[surface].kind == LX_SURFACE_OPAQUE) return (lx_rgb){0, 0, 0};
+    const lx_material *m = material_of(tracer, surface);
+    const surface_point p = point_of(tracer, surface, triangle, u, v);
+    float opacity;
+    lx_rgb transmittance;
+    split_light(tracer, surface, m, &p, base_color_at(tracer, m, &p), &opacity, &transmittance);
+    return transmittance;
+}
+
+lx_rgb lx_surface_emission(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, float u, float v)
+{
+    const lx_material *m = material_of(tracer, surface);
+    const surface_point p = point_of(tracer, surface, triangle, u, v);
+    const lx_vec4 t = sample_slot(tracer, &p, &m->emissive_texture, true);
+    lx_rgb emission = {t.x, t.y, t.z};
+    if (tracer->surfaces[surface].kind != LX_SURFACE_OPAQUE) // a hole does not shine
+        emission = lx_rgb_scale(emission, alpha_at(tracer, surface, m, base_color_at(tracer, m, &p).w));
+    return emission;
+}
+
+void lx_triangle_corners(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, lx_vec3 corners[3])
+{
+    const lx_primitive *primitive = &tracer->scene->primitives[tracer->scene->surfaces[surface].primitive];
+    const lx_vec3 *positions = tracer->surfaces[surface].positions;
+    for (int i = 0; i < 3; ++i) corners[i] = positions[primitive->indices[3 * (size_t)triangle + (size_t)i]];
+}
+
+// ---- construction ------------------------------------------------------------------------------------------------------
+
+static lx_surface_kind classify(const lx_scene *scene, const lx_surface *surface)
+{
+    const lx_material *m = &scene->materials[surface->material];
+    const bool uses_alpha = m->alpha_mode != LX_ALPHA_OPAQUE || surface->transparent;
+    const bool has_alpha = m->base_alpha < 1 || lx_texture_has_alpha(scene, &m->base_color_texture) ||
+                           scene->primitives[surface->primitive].colors != NULL;
+    if (m->transmission > 0) return LX_SURFACE_TRANSLUCENT;
+    if (!uses_alpha || !has_alpha) return LX_SURFACE_OPAQUE;
+    return m->alpha_mode == LX_ALPHA_MASK && !surface->transparent ? LX_SURFACE_CUTOUT : LX_SURFACE_TRANSLUCENT;
+}
+
+static lx_result build_surfaces(lx_tracer *tracer, bool include_dynamic, lx_error *error)
+{
+    const lx_scene *scene = tracer->scene;
+    size_t vertex_count = 0;
+    for (uint32_t i = 0; i < scene->surface_count; ++i) {
+        const lx_surface *s = &scene->surfaces[i];
+        if (scene->instances[s->instance].is_static || include_dynamic)
+            vertex_count += scene->primitives[s->primitive].vertex_count;
+    }
+    tracer->surfaces = lx_calloc_array(scene->surface_count, sizeof *tracer->surfaces);
+    tracer->positions = lx_calloc_array(vertex_count + 2, sizeof *tracer->positions); // Embree reads 16 bytes past the end
+    if (!tracer->surfaces || !tracer->positions) return lx_fail_memory(error, "world triangles");
+    lx_vec3 *next = tracer->positions;
+    for (uint32_t i = 0; i < scene->surface_count; ++i) {
+        const lx_surface *s = &scene->surfaces[i];
+        const lx_instance *instance = &scene->instances[s->instance];
+        const lx_primitive *primitive = &scene->primitives[s->primitive];
+        lx_traced_surface *out = &tracer->surfaces[i];
+        out->kind = classify(scene, s);
+        out->orientation = lx_mat4_determinant3(instance->transform) < 0 ? -1.0f : 1.0f;
+        if (!instance->is_static && !include_dynamic) continue;
+        out->positions = next;
+        for (uint32_t v = 0; v < primitive->vertex_count; ++v)
+            *next++ = lx_mat4_point(instance->transform, primitive->positions[v]);
+    }
+    return LX_OK;
+}
+
+static lx_result build_accel(lx_tracer *tracer, lx_error *error)
+{
+    const lx_scene *scene = tracer->scene;
+    lx_accel_mesh *meshes = lx_calloc_array(scene->surface_count, sizeof *meshes);
+    if (!meshes) return lx_fail_memory(error, "ray tracing structure");
+    for (uint32_t i = 0; i < scene->surface_count; ++i) {
+        const lx_primitive *primitive = &scene->primitives[scene->surfaces[i].primitive];
+        if (!tracer->surfaces[i].positions) continue;
+        meshes[i] = (lx_accel_mesh){.vertices = tracer->surfaces[i].positions, .indices = primitive->indices,
+                                    .vertex_count = primitive->vertex_count, .triangle_count = primitive->triangle_count,
+                                    .has_holes = tracer->surfaces[i].kind == LX_SURFACE_CUTOUT,
+                                    .transmits = tracer->surfaces[i].kind == LX_SURFACE_TRANSLUCENT};
+    }
+    const lx_accel_surface_queries queries = {tracer, is_hole, transmittance_at};
+    const lx_result result =
+        lx_accel_create(meshes, scene->surface_count, queries, scene->context->isa, &tracer->accel, error);
+    lx_free(meshes);
+    return result;
+}
+
+static lx_result build_sources(lx_tracer *tracer, const lx_sky_desc *sky, lx_error *error)
+{
+    const lx_scene *scene = tracer->scene;
+    const lx_result result = lx_sky_load(sky, &tracer->sky, error);
+    if (result != LX_OK) return result;
+    tracer->sky_source = (lx_source){.kind = LX_SOURCE_SKY, .name = "sky", .mode = LX_MODE_BAKED, .light = -1, .parent_node = -1,
+                                     .material = -1, .color = {sky->color[0], sky->color[1], sky->color[2]},
+                                     .intensity = sky->intensity};
+    const bool untinted = sky->color[0] == 0 && sky->color[1] == 0 && sky->color[2] == 0;
+    if (sky->file && untinted) tracer->sky_source.color = (lx_rgb){1, 1, 1};
+    tracer->source_count = scene->source_count + (tracer->sky.present ? 1 : 0);
+    tracer->source_keys = lx_calloc_array(tracer->source_count, sizeof(uint32_t));
+    if (!tracer->source_keys) return lx_fail_memory(error, "sources");
+    // Keyed by name, so that a source keeps its random numbers when others come and go.
+    for (uint32_t i = 0; i < tracer->source_count; ++i) {
+        const char *name = lx_tracer_source(tracer, i)->name;
+        const uint64_t hash = lx_hash64(lx_hash_bytes(0xcbf29ce484222325u, name, strlen(name)));
+        tracer->source_keys[i] = (uint32_t)(hash >> 32);
+    }
+    return LX_OK;
+}
+
+lx_result lx_tracer_create(const lx_scene *scene, const lx_transport_desc *transport, bool include_dynamic,
+                           lx_tracer **out_tracer, lx_error *error)
+{
+    lx_result result = LX_OK;
+    lx_tracer *tracer = lx_calloc_array(1, sizeof *tracer);
+    if (!tracer) return lx_fail_memory(error, "tracer");
+    tracer->scene = scene;
+    tracer->coloured_shadows = transport->coloured_shadows;
+    LX_TRY(build_surfaces(tracer, include_dynamic, error));
+    LX_TRY(build_accel(tracer, error));
+    LX_TRY(build_sources(tracer, &transport->sky, error));
+    LX_TRY(lx_emitters_build(tracer, error));
+    *out_tracer = tracer;
+    tracer = NULL;
+cleanup:
+    lx_tracer_destroy(tracer);
+    return result;
+}
+
+void lx_tracer_destroy(lx_tracer *tracer)
+{
+    if (!tracer) return;
+    lx_accel_destroy(tracer->accel);
+    lx_emitters_release(&tracer->emitters);
+    lx_sky_release(&tracer->sky);
+    lx_free(tracer->source_keys);
+    lx_free(tracer->surfaces);
+    lx_free(tracer->positions);
+    lx_free(tracer);
+}
+
+const lx_scene *lx_tracer_scene(const lx_tracer *tracer)
+{
+    return tracer->scene;
+}
+
+uint32_t lx_tracer_source_count(const lx_tracer *tracer)
+{
+    return tracer->source_count;
+}
+
+const lx_source *lx_tracer_source(const lx_tracer *tracer, uint32_t index)
+{
+    return index < tracer->scene->source_count ? &tracer->scene->sources[index] : &tracer->sky_source;
+}
+
+lx_rgb lx_tracer_sky_radiance(const lx_tracer *tracer, lx_vec3 direction)
+{
+    return lx_sky_radiance(&tracer->sky, direction);
+}
+
+const char *lx_tracer_isa(const lx_tracer *tracer)
+{
+    return lx_accel_isa(tracer->accel);
+}
+
+// ---- rays ------------------------------------------------------------------------------------------------------------------
+
+void lx_trace_closest(const lx_tracer *tracer, const lx_ray *rays, lx_hit *hits, size_t count)
+{
+    lx_accel_closest(tracer->accel, rays, hits, count);
+}
+
+void lx_trace_transmittance(const lx_tracer *tracer, const lx_ray *rays, lx_rgb *transmittance, size_t count)
+{
+    lx_accel_transmittance(tracer->accel, rays, transmittance, count);
+}
+
+static float offset_component(float position, float normal)
+{
+    static const float origin = 1.0f / 32, float_scale = 1.0f / 65536, int_scale = 256;
+    if (fabsf(position) < origin) return position + float_scale * normal;
+    int32_t bits;
+    memcpy(&bits, &position, sizeof bits);
+    const int32_t steps = (int32_t)(int_scale * normal);
+    bits += position < 0 ? -steps : steps;
+    memcpy(&position, &bits, sizeof position);
+    return position;
+}
+
+lx_vec3 lx_offset_origin(lx_vec3 position, lx_vec3 normal)
+{
+    return (lx_vec3){offset_component(position.x, normal.x), offset_component(position.y, normal.y),
+                     offset_component(position.z, normal.z)};
+}
+
+void lx_ray_step_past(lx_ray *ray, const lx_hit *hit)
+{
+    const float next = hit->t * (1 + 0x1p-20f);
+    ray->t_min = next > hit->t ? next : nextafterf(hit->t, INFINITY);
+}
+
+static lx_vec3 interpolated_normal(const lx_tracer *tracer, uint32_t surface, const surface_point *p, lx_vec3 geometric)
+{
+    const lx_vec3 *normals = p->primitive->normals;
+    if (!normals) return geometric;
+    const lx_mat4 *transform = &tracer->scene->instances[tracer->scene->surfaces[surface].instance].transform;
+    lx_vec3 n = lx_add(lx_add(lx_scale(normals[p->corner[0]], p->w0), lx_scale(normals[p->corner[1]], p->u)),
+                       lx_scale(normals[p->corner[2]], p->v));
+    n = lx_scale(lx_mat4_normal(*transform, n), tracer->surfaces[surface].orientation);
+    n = lx_normalize_or(n, geometric);
+    // A vertex normal that points behind the triangle can't tell which way is up; the triangle can.
+    return lx_dot(n, geometric) > 0 ? n : geometric;
+}
+
+static lx_shading shade(const lx_tracer *tracer, lx_vec3 direction, uint32_t surface, uint32_t triangle, float u, float v)
+{
+    const lx_material *m = material_of(tracer, surface);
+    const surface_point p = point_of(tracer, surface, triangle, u, v);
+    lx_vec3 corner[3];
+    lx_triangle_corners(tracer, surface, triangle, corner);
+    lx_shading s;
+    s.position = lx_add(lx_add(lx_scale(corner[0], p.w0), lx_scale(corner[1], u)), lx_scale(corner[2], v));
+    const lx_vec3 cross = lx_cross(lx_sub(corner[1], corner[0]), lx_sub(corner[2], corner[0]));
+    s.geometric_normal = lx_scale(lx_normalize_or(cross, lx_neg(direction)), tracer->surfaces[surface].orientation);
+    s.normal = interpolated_normal(tracer, surface, &p, s.geometric_normal);
+    s.front = lx_dot(s.geometric_normal, direction) < 0;
+    s.lit = s.front || m->double_sided;
+    const lx_vec4 base = base_color_at(tracer, m, &p);
+    split_light(tracer, surface, m, &p, base, &s.opacity, &s.transmittance);
+    if (tracer->surfaces[surface].kind == LX_SURFACE_OPAQUE) {
+        s.opacity = 1;
+        s.transmittance = (lx_rgb){0, 0, 0};
+    }
+    if (m->unlit) {
+        s.albedo = (lx_rgb){0, 0, 0};
+    } else {
+        const lx_vec4 mr = sample_slot(tracer, &p, &m->metallic_roughness_texture, false);
+        const float metallic = lx_clamp(m->metallic * mr.z, 0, 1), roughness = lx_clamp(m->roughness * mr.y, 0, 1);
+        const float scale = (1 - metallic) + metallic * roughness * roughness * 0.5f;
+        s.albedo = (lx_rgb){fminf(base.x * scale, largest_albedo), fminf(base.y * scale, largest_albedo),
+                            fminf(base.z * scale, largest_albedo)};
+    }
+    s.emission = (lx_rgb){0, 0, 0};
+    if (s.lit && lx_material_emits(m)) s.emission = lx_surface_emission(tracer, surface, triangle, u, v);
+    return s;
+}
+
+void lx_shade_hits(const lx_tracer *tracer, const lx_ray *rays, const lx_hit *hits, lx_shading *shading, size_t count)
+{
+    for (size_t i = 0; i < count; ++i)
+        if (hits[i].surface != LX_MISS)
+            shading[i] = shade(tracer, rays[i].direction, hits[i].surface, hits[i].triangle, hits[i].u, hits[i].v);
+}

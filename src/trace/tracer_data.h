@@ -1,0 +1,41 @@
+/// Inside a tracer, for the files of this folder.
+#ifndef LX_TRACE_TRACER_DATA_H
+#define LX_TRACE_TRACER_DATA_H
+
+#include "trace/accel.h"
+#include "trace/emitters.h"
+#include "trace/sky.h"
+
+/// How a surface meets rays.
+typedef enum lx_surface_kind {
+    LX_SURFACE_OPAQUE,
+    LX_SURFACE_CUTOUT,       ///< Alpha test: a hit is a hole or opaque.
+    LX_SURFACE_TRANSLUCENT,  ///< Light passes in part: blended, transmitting, luxel_transparent.
+} lx_surface_kind;
+
+typedef struct lx_traced_surface {
+    lx_surface_kind kind;
+    const lx_vec3 *positions; ///< World, [vertex_count] of its primitive; NULL if it is not traced.
+    float orientation;        ///< Sign of the instance's determinant.
+    uint32_t first_emitter_triangle; ///< Into emitters.triangles if the surface emits.
+} lx_traced_surface;
+
+struct lx_tracer {
+    const lx_scene *scene;
+    bool coloured_shadows;
+    lx_traced_surface *surfaces; ///< Parallel to the scene's.
+    lx_vec3 *positions;          ///< World positions of all traced surfaces, with room behind the last one.
+    lx_accel *accel;
+    lx_emitters emitters;
+    lx_sky sky;
+    lx_source sky_source;
+    uint32_t *source_keys;       ///< [source count] random stream of each source, from its name: see lx_tracer_source_key.
+    uint32_t source_count;
+};
+
+/// Corners of a triangle in world space.
+void lx_triangle_corners(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, lx_vec3 corners[3]);
+/// Radiance (unit factor and strength, textures and coverage by alpha applied) that a point of an emitting surface sends out of its shining side(s).
+lx_rgb lx_surface_emission(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, float u, float v);
+
+#endif
