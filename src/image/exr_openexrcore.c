@@ -213,6 +213,18 @@ cleanup:
     return result;
 }
 
+// OpenEXRCore 3.1 decodes B44 to wrong pixels without saying so.
+static lx_result check_compression(const struct exr_reader *reader, const struct exr_stream *stream, lx_error *error)
+{
+    lx_result result = LX_OK;
+    exr_compression_t compression;
+    EXR_TRY(exr_get_compression(reader->context, 0, &compression));
+    if (compression == EXR_COMPRESSION_B44 || compression == EXR_COMPRESSION_B44A)
+        return lx_fail(error, LX_ERROR_UNSUPPORTED, "EXR: B44 compression is not supported");
+cleanup:
+    return result;
+}
+
 // Sets up map, window and image.
 static lx_result read_header(struct exr_reader *reader, uint64_t max_pixels, const struct exr_stream *stream,
                              lx_error *error)
@@ -222,6 +234,7 @@ static lx_result read_header(struct exr_reader *reader, uint64_t max_pixels, con
     EXR_TRY(exr_get_channels(reader->context, 0, &list));
     map_channels(list, &reader->map);
     LX_TRY(check_channels(list, &reader->map, error));
+    LX_TRY(check_compression(reader, stream, error));
     EXR_TRY(exr_get_data_window(reader->context, 0, &reader->window));
     const int64_t width = (int64_t)reader->window.max.x - reader->window.min.x + 1;
     const int64_t height = (int64_t)reader->window.max.y - reader->window.min.y + 1;

@@ -12,13 +12,21 @@ typedef enum lx_ktx2_format {
 
 enum { lx_ktx2_max_levels = 16 };
 
-/// A 2D array texture. layer_count >= 1 is written as an array, even of one. levels[k] holds all layers of mip level k, one after the other,
-/// rows from the top, max(1, width >> k) × max(1, height >> k) texels each.
+/// More pixel data than this, all levels uncompressed, is refused by the reader (LX_ERROR_LIMIT).
+#define LX_KTX2_MAX_BYTES ((uint64_t)12 << 30)
+
+/// A 2D array texture. levels[k] holds all layers of mip level k, one after the other, rows from the top,
+/// max(1, width >> k) × max(1, height >> k) texels each, little-endian.
 typedef struct lx_ktx2 {
     lx_ktx2_format format;
-    uint32_t width, height, layer_count, level_count;
-    lx_bytes levels[16];
+    uint32_t width, height; ///< Of level 0, in texels, 1…65535.
+    uint32_t layer_count;   ///< At least 1, and written as an array even then. A file without layers reads as one layer.
+    uint32_t level_count;   ///< At least 1.
+    lx_bytes levels[lx_ktx2_max_levels]; ///< Owned after decoding; lx_ktx2_encode only reads them.
 } lx_ktx2;
+
+/// Bytes of mip level `level` with all its layers.
+size_t lx_ktx2_level_size(const lx_ktx2 *texture, uint32_t level);
 
 /// `zstd`: supercompression scheme 2. `writer` goes into KTXwriter ("luxel 0.1.0").
 lx_result lx_ktx2_encode(const lx_ktx2 *texture, bool zstd, const char *writer, lx_bytes *out, lx_error *error);
