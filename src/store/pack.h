@@ -1,0 +1,68 @@
+/// Writes luxel.pack, the file of the runtime (docs/pack-format.md), image by image. It is read by runtime/.
+#ifndef LX_STORE_PACK_H
+#define LX_STORE_PACK_H
+
+#include "base/file.h"
+#include "scene/scene.h"
+
+typedef struct lx_pack_layer {
+    const char *name;
+    lx_source_kind kind; ///< Of its first source.
+    lx_light_mode mode;
+    float color[3];      ///< Authored; c = color × intensity.
+    float intensity;
+    float scale;         ///< Power of two; lx_pack_scale.
+    float threshold;     ///< Blocks with no channel of that or more, in lux per unit light, are left out.
+} lx_pack_layer;
+
+typedef struct lx_pack_source {
+    const char *name;
+    lx_source_kind kind;
+    uint32_t layer;
+    float weight[3];  ///< The source shines with weight × c.
+    uint32_t node;    ///< In the file; UINT32_MAX: the sky.
+    int32_t material; ///< In the file; -1: not an emissive material.
+} lx_pack_source;
+
+typedef struct lx_pack_rect {
+    uint32_t node;        ///< In the file.
+    int32_t gpu_instance; ///< -1: none.
+    uint32_t page, texcoord, x, y, width, height;
+    float scale[2], offset[2];
+} lx_pack_rect;
+
+/// Everything but the texels. Arrays are borrowed during lx_pack_begin alone.
+typedef struct lx_pack_desc {
+    uint32_t page_size, page_count, level_count;
+    const float *page_coverage; ///< [page_count], 0…1; NULL: 0.
+    const lx_pack_layer *layers;
+    uint32_t layer_count;
+    const lx_pack_source *sources;
+    uint32_t source_count;
+    const lx_pack_rect *rects; ///< In any order, but no (node, gpu_instance) twice.
+    uint32_t rect_count;
+} lx_pack_desc;
+
+typedef struct lx_pack_stats {
+    uint64_t block_count, absent_count;
+    /// Largest error of a stored texel relative to its largest channel, over texels that RGB9E5 holds with its full precision
+    /// (the 30 octaves below the layer's brightest). At most 1/512.
+    float largest_error;
+} lx_pack_stats;
+
+/// The scale for a layer whose largest channel anywhere is `largest`: that becomes 2^14 … 2^15. 1 for a black layer.
+float lx_pack_scale(float largest);
+/// ⌊log2 padding⌋ + 1, and never a level without texels.
+uint32_t lx_pack_level_count(uint32_t page_size, uint32_t padding);
+
+typedef struct lx_pack_writer lx_pack_writer;
+
+lx_result lx_pack_begin(const lx_pack_desc *desc, lx_pack_writer **out_writer, lx_error *error);
+/// One layer of one mip level of a page: (page_size >> level)² RGB floats, row 0 first. Images may come in any order, each at most
+/// once; those that don't come are black.
+lx_result lx_pack_add_image(lx_pack_writer *writer, uint32_t page, uint32_t layer, uint32_t level, const float *rgb, lx_error *error);
+/// The finished file; the writer is left empty, good for lx_pack_destroy alone. `out_stats` may be NULL.
+lx_result lx_pack_finish(lx_pack_writer *writer, lx_bytes *out, lx_pack_stats *out_stats, lx_error *error);
+void lx_pack_destroy(lx_pack_writer *writer);
+
+#endif
