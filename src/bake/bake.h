@@ -4,7 +4,7 @@
 
 #include "luxel/bake.h"
 #include "scene/atlas.h"
-#include "trace/tracer.h"
+#include "trace/path.h"
 
 /// What one vector of colours drives. Members: the sources whose lx_source_use.layer is this layer.
 typedef struct lx_layer {
@@ -26,6 +26,8 @@ struct lx_bake {
 
     lx_layer *layers;
     uint32_t layer_count;
+    lx_source_use *uses;   ///< [source_count] per source of the tracer: its layer and its share of it (weight).
+    uint32_t source_count;
 
     /// T of every layer: image (page * layer_count + layer), page_size² × RGB floats, row 0 first. Unit light: lux per cd, lx or nt
     /// (for `combined`: lux). After lx_bake_run padding is filled by dilation.

@@ -22,7 +22,7 @@ enum { dimension_bounce = 1, dimension_roulette = 2, dimension_pass = 3 };
 
 typedef struct path {
     lx_receiver receiver;
-    lx_rgb throughput;
+    lx_rgb throughput, weight;
     uint32_t stream, sample, target;
 } path;
 
@@ -70,12 +70,12 @@ static uint32_t dimension_key(const path *p, uint32_t vertex, uint32_t dimension
     return lx_hash_combine(p->stream, vertex * 4096 + dimension);
 }
 
-static void add(double *sums, const lx_path_settings *settings, uint32_t target, const lx_source_use *use, lx_rgb value)
+static void add(double *sums, const lx_path_settings *settings, const path *p, const lx_source_use *use, lx_rgb value)
 {
-    double *sum = sums + 3 * ((size_t)target * settings->layer_count + (size_t)use->layer);
-    sum[0] += (double)(value.r * use->weight.r);
-    sum[1] += (double)(value.g * use->weight.g);
-    sum[2] += (double)(value.b * use->weight.b);
+    double *sum = sums + 3 * ((size_t)p->target * settings->layer_count + (size_t)use->layer);
+    sum[0] += (double)(value.r * p->weight.r * use->weight.r);
+    sum[1] += (double)(value.g * p->weight.g * use->weight.g);
+    sum[2] += (double)(value.b * p->weight.b * use->weight.b);
 }
 
 // Does light that reaches vertex `vertex` straight from a source count?
@@ -104,7 +104,7 @@ static void add_light_samples(lx_path_batch *b, const lx_path_settings *settings
         for (size_t k = 0; k < count; ++k) {
             const path *p = &b->paths[b->owner[k]];
             const lx_rgb arrives = lx_rgb_mul(b->light[k], b->transmittance[k]);
-            if (!lx_rgb_is_black(arrives)) add(sums, settings, p->target, use, lx_rgb_mul(p->throughput, arrives));
+            if (!lx_rgb_is_black(arrives)) add(sums, settings, p, use, lx_rgb_mul(p->throughput, arrives));
         }
     }
 }
@@ -136,7 +136,7 @@ static void add_sky(const lx_path_settings *settings, const path *p, const fligh
     if (!counts(settings, use, vertex)) return;
     const float weight = lx_sky_weight(tracer, direction, f->cosine);
     const lx_rgb radiance = lx_sky_radiance(&tracer->sky, direction);
-    add(sums, settings, p->target, use, lx_rgb_scale(lx_rgb_mul(f->throughput, radiance), LX_PI * weight));
+    add(sums, settings, p, use, lx_rgb_scale(lx_rgb_mul(f->throughput, radiance), LX_PI * weight));
 }
 
 static void add_emission(const lx_path_settings *settings, const path *p, const flight *f, const lx_ray *ray, const lx_hit *hit,
@@ -147,7 +147,7 @@ static void add_emission(const lx_path_settings *settings, const path *p, const 
     const lx_source_use *use = &settings->uses[source];
     if (!counts(settings, use, vertex)) return;
     const float weight = lx_hit_weight(settings->tracer, ray, hit, shading->geometric_normal, f->cosine);
-    add(sums, settings, p->target, use, lx_rgb_scale(lx_rgb_mul(f->throughput, shading->emission), LX_PI * weight));
+    add(sums, settings, p, use, lx_rgb_scale(lx_rgb_mul(f->throughput, shading->emission), LX_PI * weight));
 }
 
 // Decides at a surface that lets light through: true if the ray goes straight on. The flight's throughput pays for the choice.
@@ -176,7 +176,7 @@ static bool make_vertex(const path *p, const flight *f, const lx_shading *s, uin
     throughput = lx_rgb_scale(throughput, 1 / survival);
     const float side = s->front ? 1.0f : -1.0f;
     *out = (path){.receiver = {s->position, lx_scale(s->normal, side), lx_scale(s->geometric_normal, side)},
-                  .throughput = throughput, .stream = p->stream, .sample = p->sample, .target = p->target};
+                  .throughput = throughput, .weight = p->weight, .stream = p->stream, .sample = p->sample, .target = p->target};
     return true;
 }
 
@@ -227,8 +227,8 @@ void lx_path_trace(lx_path_batch *b, const lx_path_settings *settings, const lx_
                    uint32_t *back_hits)
 {
     for (size_t i = 0; i < count; ++i)
-        b->paths[i] = (path){.receiver = starts[i].receiver, .throughput = {1, 1, 1}, .stream = starts[i].stream,
-                             .sample = starts[i].sample, .target = starts[i].target};
+        b->paths[i] = (path){.receiver = starts[i].receiver, .throughput = {1, 1, 1}, .weight = starts[i].weight,
+                             .stream = starts[i].stream, .sample = starts[i].sample, .target = starts[i].target};
     for (uint32_t vertex = 0; count > 0; ++vertex) {
         add_light_samples(b, settings, count, vertex, sums);
         const size_t flights = start_flights(b, count, vertex);

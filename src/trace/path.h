@@ -25,6 +25,7 @@ typedef struct lx_path_settings {
 /// One path: where it starts, which random numbers it takes, where its estimate goes.
 typedef struct lx_path_start {
     lx_receiver receiver;
+    lx_rgb weight;   ///< Multiplies what the path adds; 1 for irradiance.
     uint32_t stream; ///< Key of the start's random streams: a hash of seed, page and texel.
     uint32_t sample; ///< Number of the path within the stream.
     uint32_t target; ///< Row of the sums.

@@ -294,17 +294,57 @@ void lx_ray_step_past(lx_ray *ray, const lx_hit *hit)
     ray->t_min = next > hit->t ? next : nextafterf(hit->t, INFINITY);
 }
 
+static lx_vec3 geometric_normal(const lx_tracer *tracer, uint32_t surface, const lx_vec3 corner[3])
+{
+    const lx_vec3 cross = lx_cross(lx_sub(corner[1], corner[0]), lx_sub(corner[2], corner[0]));
+    return lx_scale(lx_normalize_or(cross, (lx_vec3){0, 1, 0}), tracer->surfaces[surface].orientation);
+}
+
+static lx_vec3 world_normal(const lx_tracer *tracer, uint32_t surface, lx_vec3 local)
+{
+    const lx_mat4 *transform = &tracer->scene->instances[tracer->scene->surfaces[surface].instance].transform;
+    return lx_scale(lx_mat4_normal(*transform, local), tracer->surfaces[surface].orientation);
+}
+
 static lx_vec3 interpolated_normal(const lx_tracer *tracer, uint32_t surface, const surface_point *p, lx_vec3 geometric)
 {
     const lx_vec3 *normals = p->primitive->normals;
     if (!normals) return geometric;
-    const lx_mat4 *transform = &tracer->scene->instances[tracer->scene->surfaces[surface].instance].transform;
-    lx_vec3 n = lx_add(lx_add(lx_scale(normals[p->corner[0]], p->w0), lx_scale(normals[p->corner[1]], p->u)),
-                       lx_scale(normals[p->corner[2]], p->v));
-    n = lx_scale(lx_mat4_normal(*transform, n), tracer->surfaces[surface].orientation);
-    n = lx_normalize_or(n, geometric);
+    const lx_vec3 local = lx_add(lx_add(lx_scale(normals[p->corner[0]], p->w0), lx_scale(normals[p->corner[1]], p->u)),
+                                 lx_scale(normals[p->corner[2]], p->v));
+    const lx_vec3 n = lx_normalize_or(world_normal(tracer, surface, local), geometric);
     // A vertex normal that points behind the triangle can't tell which way is up; the triangle can.
     return lx_dot(n, geometric) > 0 ? n : geometric;
+}
+
+void lx_hit_geometry(const lx_tracer *tracer, const lx_hit *hit, lx_vec3 *position, lx_vec3 *normal)
+{
+    lx_vec3 c[3];
+    lx_triangle_corners(tracer, hit->surface, hit->triangle, c);
+    *position = lx_add(lx_add(lx_scale(c[0], 1 - hit->u - hit->v), lx_scale(c[1], hit->u)), lx_scale(c[2], hit->v));
+    *normal = geometric_normal(tracer, hit->surface, c);
+}
+
+bool lx_triangle_normals(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, lx_vec3 normals[3])
+{
+    const surface_point p = point_of(tracer, surface, triangle, 0, 0);
+    if (!p.primitive->normals) return false;
+    for (int i = 0; i < 3; ++i)
+        normals[i] = lx_normalize_or(world_normal(tracer, surface, p.primitive->normals[p.corner[i]]), (lx_vec3){0, 0, 0});
+    return true;
+}
+
+lx_vec3 lx_normal_at(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, float u, float v)
+{
+    lx_vec3 corners[3];
+    lx_triangle_corners(tracer, surface, triangle, corners);
+    const surface_point p = point_of(tracer, surface, triangle, u, v);
+    return interpolated_normal(tracer, surface, &p, geometric_normal(tracer, surface, corners));
+}
+
+bool lx_surface_is_double_sided(const lx_tracer *tracer, uint32_t surface)
+{
+    return material_of(tracer, surface)->double_sided;
 }
 
 static lx_shading shade(const lx_tracer *tracer, lx_vec3 direction, uint32_t surface, uint32_t triangle, float u, float v)
@@ -315,8 +355,7 @@ static lx_shading shade(const lx_tracer *tracer, lx_vec3 direction, uint32_t sur
     lx_triangle_corners(tracer, surface, triangle, corner);
     lx_shading s;
     s.position = lx_add(lx_add(lx_scale(corner[0], p.w0), lx_scale(corner[1], u)), lx_scale(corner[2], v));
-    const lx_vec3 cross = lx_cross(lx_sub(corner[1], corner[0]), lx_sub(corner[2], corner[0]));
-    s.geometric_normal = lx_scale(lx_normalize_or(cross, lx_neg(direction)), tracer->surfaces[surface].orientation);
+    s.geometric_normal = geometric_normal(tracer, surface, corner);
     s.normal = interpolated_normal(tracer, surface, &p, s.geometric_normal);
     s.front = lx_dot(s.geometric_normal, direction) < 0;
     s.lit = s.front || m->double_sided;
@@ -336,7 +375,10 @@ static lx_shading shade(const lx_tracer *tracer, lx_vec3 direction, uint32_t sur
                             fminf(base.z * scale, largest_albedo)};
     }
     s.emission = (lx_rgb){0, 0, 0};
-    if (s.lit && lx_material_emits(m)) s.emission = lx_surface_emission(tracer, surface, triangle, u, v);
+    if (m->unlit)
+        s.emission = (lx_rgb){base.x, base.y, base.z};
+    else if (s.lit && lx_material_emits(m))
+        s.emission = lx_surface_emission(tracer, surface, triangle, u, v);
     return s;
 }
 

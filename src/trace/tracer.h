@@ -35,6 +35,7 @@ typedef struct lx_shading {
     lx_rgb albedo;            ///< Diffuse reflectance of that share, at most 0.99.
     lx_rgb transmittance;     ///< Share of light that passes straight on; 0 for opaque surfaces. opacity + transmittance <= 1.
     lx_rgb emission;          ///< Radiance in nit towards the ray's origin at unit factor and strength (texture alone); 0 if none.
+                              ///< Unlit materials: their base colour.
 } lx_shading;
 
 typedef struct lx_tracer lx_tracer;
@@ -58,6 +59,17 @@ void lx_trace_closest(const lx_tracer *tracer, const lx_ray *rays, lx_hit *hits,
 void lx_trace_transmittance(const lx_tracer *tracer, const lx_ray *rays, lx_rgb *transmittance, size_t count);
 /// Shades hits; misses are skipped. Thread-safe.
 void lx_shade_hits(const lx_tracer *tracer, const lx_ray *rays, const lx_hit *hits, lx_shading *shading, size_t count);
+
+/// The bare geometry of a hit: what is there without asking its material. `normal` is the unit geometric normal of the front side.
+void lx_hit_geometry(const lx_tracer *tracer, const lx_hit *hit, lx_vec3 *position, lx_vec3 *normal);
+/// Corners of a triangle in world space.
+void lx_triangle_corners(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, lx_vec3 corners[3]);
+/// Unit vertex normals of a triangle in world space; false if it is flat-shaded.
+bool lx_triangle_normals(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, lx_vec3 normals[3]);
+/// Interpolated unit normal at barycentrics (u, v), on the front side.
+lx_vec3 lx_normal_at(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, float u, float v);
+/// Does the surface shine or shade from its back too?
+bool lx_surface_is_double_sided(const lx_tracer *tracer, uint32_t surface);
 
 /// A ray's origin moved off its surface to the side of `normal` (unit, geometric) by a few roundings of the coordinates.
 /// Based on: [WachterBinder2019] "A Fast and Robust Method for Avoiding Self-Intersection", Ray Tracing Gems, ch. 6.

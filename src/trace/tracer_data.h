@@ -33,8 +33,6 @@ struct lx_tracer {
     uint32_t source_count;
 };
 
-/// Corners of a triangle in world space.
-void lx_triangle_corners(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, lx_vec3 corners[3]);
 /// Radiance (unit factor and strength, textures and coverage by alpha applied) that a point of an emitting surface sends out of its shining side(s).
 lx_rgb lx_surface_emission(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, float u, float v);
 

@@ -1,0 +1,249 @@
+// Layers from sources: one each, or one per `luxel_layer`; grouped further when there are too many.
+//
+// A group's sources keep their authored proportions: T = sum of (colour · intensity / K) T_s with K the largest channel value in the group,
+// and c = K · white. If all colours are equal the colour stays free: T = sum of (intensity / strongest) T_s, c = colour × strongest.
+#include "bake/layers.h"
+
+#include "base/error.h"
+
+#include <string.h>
+
+static const char *unit_of(lx_source_kind kind)
+{
+    switch (kind) {
+    case LX_SOURCE_POINT:
+    case LX_SOURCE_SPOT: return "cd";
+    case LX_SOURCE_DIRECTIONAL: return "lx";
+    default: return "nt";
+    }
+}
+
+static lx_rgb authored(const lx_source *s)
+{
+    return lx_rgb_scale(s->color, s->intensity);
+}
+
+lx_source_use *lx_uses_combined(const lx_tracer *tracer)
+{
+    const uint32_t count = lx_tracer_source_count(tracer);
+    lx_source_use *uses = lx_calloc_array(count, sizeof *uses);
+    if (!uses) return NULL;
+    for (uint32_t i = 0; i < count; ++i) {
+        const lx_source *s = lx_tracer_source(tracer, i);
+        uses[i] = (lx_source_use){.layer = 0, .weight = authored(s), .direct = s->mode != LX_MODE_MIXED};
+    }
+    return uses;
+}
+
+// Group keys: sources with equal, non-NULL keys share a layer.
+typedef struct grouping {
+    char **keys;      // [source count], owned; NULL: a layer of its own
+    uint32_t count;
+} grouping;
+
+static uint32_t count_layers(const grouping *g)
+{
+    uint32_t layers = 0;
+    for (uint32_t i = 0; i < g->count; ++i) {
+        bool first = true;
+        for (uint32_t k = 0; g->keys[i] && k < i && first; ++k) first = !g->keys[k] || strcmp(g->keys[k], g->keys[i]) != 0;
+        layers += first;
+    }
+    return layers;
+}
+
+static lx_result set_key(grouping *g, uint32_t index, char *key, lx_error *error)
+{
+    if (!key) return lx_fail_memory(error, "layers");
+    lx_free(g->keys[index]);
+    g->keys[index] = key;
+    return LX_OK;
+}
+
+// Too many: emissive sources of one material first, then what hangs on one parent node (per unit).
+static lx_result group_further(const lx_bake *bake, grouping *g, lx_error *error)
+{
+    const lx_scene *scene = bake->scene;
+    const uint32_t wanted = bake->desc.max_layers, single = count_layers(g);
+    if (single <= wanted) return LX_OK;
+    for (uint32_t i = 0; i < g->count; ++i) {
+        const lx_source *s = lx_tracer_source(bake->tracer, i);
+        if (s->layer || s->kind != LX_SOURCE_EMISSIVE) continue;
+        const char *name = scene->materials[s->material].name;
+        const lx_result result = set_key(g, i, name[0] ? lx_strdup(name) : lx_format("material_%d", s->material), error);
+        if (result != LX_OK) return result;
+    }
+    uint32_t count = count_layers(g);
+    const char *how = "by material";
+    if (count > wanted) {
+        how = "by material and parent node";
+        for (uint32_t i = 0; i < g->count; ++i) {
+            const lx_source *s = lx_tracer_source(bake->tracer, i);
+            if (s->layer || s->kind == LX_SOURCE_SKY) continue;
+            char *key = s->parent_node < 0 ? lx_format("top level (%s)", unit_of(s->kind))
+                                           : lx_format("children of node %d (%s)", s->parent_node, unit_of(s->kind));
+            const lx_result result = set_key(g, i, key, error);
+            if (result != LX_OK) return result;
+        }
+        count = count_layers(g);
+    }
+    if (count > wanted)
+        return lx_fail(error, LX_ERROR_LIMIT,
+                       "%u layers are more than --max-layers %u, even grouped %s: raise it or name groups with luxel_layer",
+                       count, wanted, how);
+    lx_log_note(scene->context->log, "%u sources are more than --max-layers %u: grouped %s into %u layers", single, wanted,
+                how, count);
+    return LX_OK;
+}
+
+static bool name_is_taken(const lx_bake *bake, const char *name)
+{
+    for (uint32_t i = 0; i < bake->layer_count; ++i)
+        if (strcmp(bake->layers[i].name, name) == 0) return true;
+    return false;
+}
+
+static char *unique_name(const lx_bake *bake, const char *name)
+{
+    char *candidate = lx_strdup(name);
+    for (uint32_t k = 2; candidate && name_is_taken(bake, candidate); ++k) {
+        lx_free(candidate);
+        candidate = lx_format("%s#%u", name, k);
+    }
+    return candidate;
+}
+
+static const char *node_name(const lx_bake *bake, const lx_source *s)
+{
+    if (s->kind == LX_SOURCE_SKY) return "";
+    if (s->light >= 0) return bake->scene->lights[s->light].name;
+    for (uint32_t i = 0; i < bake->scene->instance_count; ++i)
+        if (bake->scene->instances[i].node == s->node) return bake->scene->instances[i].name;
+    return s->name;
+}
+
+static bool same_color(lx_rgb a, lx_rgb b)
+{
+    return a.r == b.r && a.g == b.g && a.b == b.b;
+}
+
+// Colour, intensity and shares of a layer whose members are known by uses[i].layer.
+static void weigh_members(lx_bake *bake, uint32_t layer_index)
+{
+    lx_layer *layer = &bake->layers[layer_index];
+    lx_rgb color = {0, 0, 0};
+    bool first = true, equal = true;
+    float strongest = 0, largest = 0;
+    for (uint32_t i = 0; i < bake->source_count; ++i) {
+        if (bake->uses[i].layer != (int32_t)layer_index) continue;
+        const lx_source *s = lx_tracer_source(bake->tracer, i);
+        if (first) color = s->color;
+        equal &= same_color(color, s->color);
+        first = false;
+        strongest = fmaxf(strongest, s->intensity);
+        largest = fmaxf(largest, lx_rgb_max(authored(s)));
+    }
+    const lx_rgb shown = equal ? color : lx_rgb_grey(1);
+    layer->color[0] = shown.r;
+    layer->color[1] = shown.g;
+    layer->color[2] = shown.b;
+    layer->intensity = equal ? strongest : largest;
+    for (uint32_t i = 0; i < bake->source_count; ++i) {
+        if (bake->uses[i].layer != (int32_t)layer_index) continue;
+        const lx_source *s = lx_tracer_source(bake->tracer, i);
+        lx_rgb weight = {1, 1, 1};
+        if (equal && strongest > 0) weight = lx_rgb_grey(s->intensity / strongest);
+        if (!equal && largest > 0) weight = lx_rgb_scale(authored(s), 1 / largest);
+        bake->uses[i].weight = weight;
+    }
+}
+
+static lx_result check_units(const lx_bake *bake, uint32_t layer_index, lx_error *error)
+{
+    const lx_source *first = NULL;
+    for (uint32_t i = 0; i < bake->source_count; ++i) {
+        if (bake->uses[i].layer != (int32_t)layer_index) continue;
+        const lx_source *s = lx_tracer_source(bake->tracer, i);
+        if (!first) first = s;
+        if (strcmp(unit_of(s->kind), unit_of(first->kind)) != 0)
+            return lx_fail(error, LX_ERROR_FORMAT,
+                           "layer '%s': sources '%s' (%s) and '%s' (%s) have different units; give them two luxel_layer names",
+                           bake->layers[layer_index].name, first->name, unit_of(first->kind), s->name, unit_of(s->kind));
+    }
+    return LX_OK;
+}
+
+static lx_result add_layer(lx_bake *bake, const grouping *g, uint32_t first, lx_error *error)
+{
+    const lx_source *s = lx_tracer_source(bake->tracer, first);
+    lx_layer *layer = &bake->layers[bake->layer_count];
+    *layer = (lx_layer){.name = unique_name(bake, g->keys[first] ? g->keys[first] : s->name), .kind = s->kind,
+                        .node = node_name(bake, s), .unit = unit_of(s->kind), .mode = LX_MODE_BAKED};
+    if (!layer->name) return lx_fail_memory(error, "layers");
+    const uint32_t index = bake->layer_count++;
+    for (uint32_t i = first; i < bake->source_count; ++i) {
+        const lx_source *other = lx_tracer_source(bake->tracer, i);
+        const bool member = i == first || (g->keys[first] && g->keys[i] && strcmp(g->keys[i], g->keys[first]) == 0);
+        if (!member) continue;
+        bake->uses[i].layer = (int32_t)index;
+        bake->uses[i].direct = other->mode != LX_MODE_MIXED;
+        if (other->mode == LX_MODE_MIXED) layer->mode = LX_MODE_MIXED;
+        ++layer->source_count;
+    }
+    const lx_result result = check_units(bake, index, error);
+    if (result != LX_OK) return result;
+    weigh_members(bake, index);
+    return LX_OK;
+}
+
+static lx_result build_combined(lx_bake *bake, lx_error *error)
+{
+    bake->layers = lx_calloc_array(1, sizeof *bake->layers);
+    bake->uses = lx_uses_combined(bake->tracer);
+    if (!bake->layers || !bake->uses) return lx_fail_memory(error, "layers");
+    lx_layer *layer = &bake->layers[0];
+    *layer = (lx_layer){.name = lx_strdup("combined"), .kind = LX_SOURCE_SKY, .node = "", .unit = "lx", .mode = LX_MODE_BAKED,
+                        .color = {1, 1, 1}, .intensity = 1, .source_count = bake->source_count};
+    bake->layer_count = 1;
+    return layer->name ? LX_OK : lx_fail_memory(error, "layers");
+}
+
+lx_result lx_layers_build(lx_bake *bake, lx_error *error)
+{
+    lx_result result = LX_OK;
+    grouping g = {.count = lx_tracer_source_count(bake->tracer)};
+    bake->source_count = g.count;
+    if (g.count == 0)
+        lx_log_warning(bake->scene->context->log, "nothing shines, the lightmap will be black: add lights "
+                       "(KHR_lights_punctual), emissive materials or a sky (--sky 1,1,1)");
+    if (bake->desc.combined) return build_combined(bake, error);
+    bake->layers = lx_calloc_array(g.count, sizeof *bake->layers);
+    bake->uses = lx_calloc_array(g.count, sizeof *bake->uses);
+    g.keys = lx_calloc_array(g.count, sizeof *g.keys);
+    if (!bake->layers || !bake->uses || !g.keys) {
+        result = lx_fail_memory(error, "layers");
+        goto cleanup;
+    }
+    for (uint32_t i = 0; i < g.count; ++i) {
+        bake->uses[i].layer = -1;
+        const char *name = lx_tracer_source(bake->tracer, i)->layer;
+        if (name) LX_TRY(set_key(&g, i, lx_strdup(name), error));
+    }
+    LX_TRY(group_further(bake, &g, error));
+    for (uint32_t i = 0; i < g.count; ++i)
+        if (bake->uses[i].layer < 0) LX_TRY(add_layer(bake, &g, i, error));
+cleanup:
+    for (uint32_t i = 0; g.keys && i < g.count; ++i) lx_free(g.keys[i]);
+    lx_free(g.keys);
+    return result;
+}
+
+void lx_layers_release(lx_bake *bake)
+{
+    for (uint32_t i = 0; i < bake->layer_count; ++i) lx_free(bake->layers[i].name);
+    lx_free(bake->layers);
+    lx_free(bake->uses);
+    bake->layers = NULL;
+    bake->uses = NULL;
+    bake->layer_count = 0;
+}

@@ -1,0 +1,14 @@
+/// Which source goes into which layer.
+#ifndef LX_BAKE_LAYERS_H
+#define LX_BAKE_LAYERS_H
+
+#include "bake/bake.h"
+
+/// Fills bake->layers, layer_count, uses and source_count from the tracer's sources and the desc (spec: layers and groups).
+lx_result lx_layers_build(lx_bake *bake, lx_error *error);
+void lx_layers_release(lx_bake *bake);
+
+/// Uses that put every source into layer 0 at its authored colour; [source count], owned by the caller; NULL: no memory.
+lx_source_use *lx_uses_combined(const lx_tracer *tracer);
+
+#endif
