@@ -1,4 +1,7 @@
 // OpenEXR through OpenEXRCore's C API, in memory. The only file that includes its headers.
+//
+// The library parses, validates, reads and decompresses. Unpacking is done here: the library's own (3.1) picks fast paths
+// that mix up the channels of interleaved halves, or write through null pointers where one of them is not wanted.
 #include "image/codec.h"
 #include "image/encode.h"
 
@@ -10,7 +13,7 @@
 
 enum {
     max_side = 65535,
-    max_file_channels = 1024, // of all names; keeps a chunk's buffers in proportion
+    max_file_channels = 1024, // of all names; keeps a chunk's buffers in proportion to the image
     flags_offset = 4,         // version and flags follow the magic number
 };
 
@@ -21,6 +24,13 @@ struct exr_stream {
     lx_sink sink; // writing
     char message[200];
 };
+
+// For the library's buffers, whose sizes come from the file. Zeroed, because a chunk that decompresses to less than its size
+// leaves the rest as it was.
+static void *allocate(size_t size)
+{
+    return size <= (size_t)4 << 30 ? lx_calloc_array(size, 1) : NULL;
+}
 
 static struct exr_stream *stream_of(exr_const_context_t context)
 {
@@ -86,6 +96,7 @@ static lx_result fail_exr(exr_result_t code, const struct exr_stream *stream, lx
 struct channel_map {
     uint32_t count;
     int file_index[4];
+    uint32_t pixel_bytes; // of all channels of the file
 };
 
 static int find_channel(const exr_attr_chlist_t *list, const char *name)
@@ -109,6 +120,8 @@ static void map_channels(const exr_attr_chlist_t *list, struct channel_map *map)
         map->file_index[map->count++] = y;
     }
     if (map->count > 0 && a >= 0) map->file_index[map->count++] = a;
+    for (int i = 0; i < list->num_channels; ++i)
+        map->pixel_bytes += list->entries[i].pixel_type == EXR_PIXEL_HALF ? 2 : 4;
 }
 
 static lx_result check_channels(const exr_attr_chlist_t *list, const struct channel_map *map, lx_error *error)
@@ -159,24 +172,65 @@ static void aim_channels(struct exr_reader *reader, uint32_t x, uint32_t y)
     }
 }
 
-// Decodes one chunk to (x, y). The library's chunk must lie inside the image, whatever the file says.
+static float load_value(const uint8_t *in, bool is_half)
+{
+    if (is_half) return lx_half_to_float((uint16_t)(in[0] | in[1] << 8));
+    const uint32_t bits = in[0] | (uint32_t)in[1] << 8 | (uint32_t)in[2] << 16 | (uint32_t)in[3] << 24;
+    float value;
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
+// A chunk is its lines one after the other, a line its channels one after the other, little-endian. Nothing is subsampled.
+static exr_result_t unpack_chunk(exr_decode_pipeline_t *pipeline)
+{
+    const uint8_t *in = pipeline->unpacked_buffer;
+    const int32_t width = pipeline->chunk.width;
+    for (int32_t y = 0; y < pipeline->chunk.height; ++y)
+        for (int16_t c = 0; c < pipeline->channel_count; ++c) {
+            const exr_coding_channel_info_t *channel = &pipeline->channels[c];
+            const size_t value_bytes = (size_t)channel->bytes_per_element;
+            if (channel->decode_to_ptr) {
+                uint8_t *out = channel->decode_to_ptr + (ptrdiff_t)y * channel->user_line_stride;
+                for (int32_t x = 0; x < width; ++x, out += channel->user_pixel_stride) {
+                    const float value = load_value(in + value_bytes * (size_t)x, value_bytes == 2);
+                    memcpy(out, &value, sizeof value);
+                }
+            }
+            in += value_bytes * (size_t)width;
+        }
+    return EXR_ERR_SUCCESS;
+}
+
+// The chunk must lie inside the image and be as large as its pixels, whatever the file says.
+static bool chunk_is_sound(const struct exr_reader *reader, const exr_chunk_info_t *chunk, uint32_t x, uint32_t y)
+{
+    const lx_image *image = &reader->image;
+    if (x >= image->width || y >= image->height || chunk->width < 1 || chunk->height < 1) return false;
+    if ((uint32_t)chunk->width > image->width - x || (uint32_t)chunk->height > image->height - y) return false;
+    if (chunk->unpacked_size != (uint64_t)chunk->width * (uint64_t)chunk->height * reader->map.pixel_bytes) return false;
+    if (chunk->packed_size == 0 || chunk->packed_size > chunk->unpacked_size) return false;
+    return chunk->compression != EXR_COMPRESSION_NONE || chunk->packed_size == chunk->unpacked_size;
+}
+
 static lx_result read_chunk(struct exr_reader *reader, const exr_chunk_info_t *chunk, uint32_t x, uint32_t y,
                             const struct exr_stream *stream, lx_error *error)
 {
     lx_result result = LX_OK;
-    if (x >= reader->image.width || y >= reader->image.height || chunk->width < 0 || chunk->height < 0 ||
-        (uint32_t)chunk->width > reader->image.width - x || (uint32_t)chunk->height > reader->image.height - y)
-        return lx_fail(error, LX_ERROR_FORMAT, "EXR: chunk outside of the image");
+    exr_decode_pipeline_t *pipeline = &reader->pipeline;
+    if (!chunk_is_sound(reader, chunk, x, y)) return lx_fail(error, LX_ERROR_FORMAT, "EXR: damaged chunk");
     if (reader->pipeline_ready) {
-        EXR_TRY(exr_decoding_update(reader->context, 0, chunk, &reader->pipeline));
+        EXR_TRY(exr_decoding_update(reader->context, 0, chunk, pipeline));
         aim_channels(reader, x, y);
     } else {
         reader->pipeline_ready = true; // from here on it needs destroying, even if this fails
-        EXR_TRY(exr_decoding_initialize(reader->context, 0, chunk, &reader->pipeline));
+        EXR_TRY(exr_decoding_initialize(reader->context, 0, chunk, pipeline));
         aim_channels(reader, x, y);
-        EXR_TRY(exr_decoding_choose_default_routines(reader->context, 0, &reader->pipeline));
+        EXR_TRY(exr_decoding_choose_default_routines(reader->context, 0, pipeline));
+        // Null if the chosen read function puts a single channel of floats straight into the image.
+        if (pipeline->unpack_and_convert_fn) pipeline->unpack_and_convert_fn = unpack_chunk;
     }
-    EXR_TRY(exr_decoding_run(reader->context, 0, &reader->pipeline));
+    EXR_TRY(exr_decoding_run(reader->context, 0, pipeline));
 cleanup:
     return result;
 }
@@ -262,6 +316,8 @@ lx_result lx_exr_decode(const void *data, size_t size, uint64_t max_pixels, lx_i
     struct exr_reader reader = {0};
     exr_context_initializer_t setup = EXR_DEFAULT_CONTEXT_INITIALIZER;
     setup.error_handler_fn = on_error;
+    setup.alloc_fn = allocate;
+    setup.free_fn = lx_free;
     setup.user_data = stream;
     setup.read_fn = read_stream;
     setup.size_fn = stream_size;

@@ -58,12 +58,13 @@ static void no_source_change(j_decompress_ptr info)
     (void)info;
 }
 
-// The file has ended: hand out end markers. If the decoder still wanted pixels, it says JWRN_HIT_MARKER.
+// The file has ended: hand out end markers. If the decoder still wanted pixels, it says JWRN_HIT_MARKER; but whole scans
+// of a progressive file may be missing without a word.
 static boolean fill_with_end(j_decompress_ptr info)
 {
     static const JOCTET end[2] = {0xff, JPEG_EOI};
     struct jpeg_reader *reader = info->client_data;
-    if (!reader->image.data) escape_with(reader, LX_ERROR_FORMAT, "truncated"); // still in the headers
+    if (!reader->image.data || jpeg_has_multiple_scans(info)) escape_with(reader, LX_ERROR_FORMAT, "truncated");
     info->src->next_input_byte = end;
     info->src->bytes_in_buffer = sizeof end;
     return TRUE;
