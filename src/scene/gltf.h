@@ -9,4 +9,7 @@
 lx_result lx_gltf_import(lx_context *context, const char *name, const char *folder, const void *data, size_t size,
                          const lx_scene_load_desc *desc, lx_scene **out_scene, lx_error *error);
 
+/// Lets go of scene->document; NULL is fine.
+void lx_gltf_document_release(struct json_t *document);
+
 #endif
