@@ -1,0 +1,86 @@
+#include "render/view.h"
+
+#include "base/error.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static lx_camera framing_camera(const lx_scene *scene, float aspect)
+{
+    const lx_vec3 centre = lx_scale(lx_add(scene->bounds.low, scene->bounds.high), 0.5f);
+    const float radius = fmaxf(0.5f * lx_distance(scene->bounds.low, scene->bounds.high), 1e-6f);
+    const lx_vec3 back = lx_normalize((lx_vec3){0.55f, 0.45f, 1});
+    const float yfov = 40 * LX_PI / 180;
+    // The sphere around the scene just fits the narrower side.
+    const float half = aspect < 1 ? atanf(tanf(yfov / 2) * aspect) : yfov / 2;
+    const lx_vec3 eye = lx_mad(centre, back, radius / sinf(half));
+    const lx_vec3 right = lx_normalize(lx_cross((lx_vec3){0, 1, 0}, back)), up = lx_cross(back, right);
+    return (lx_camera){.name = "", .perspective = true, .yfov = yfov,
+                       .transform = {{right.x, right.y, right.z, 0, up.x, up.y, up.z, 0, back.x, back.y, back.z, 0, eye.x,
+                                      eye.y, eye.z, 1}}};
+}
+
+static lx_result fail_camera(const lx_scene *scene, const char *name, lx_error *error)
+{
+    char list[256] = "";
+    for (uint32_t i = 0; i < scene->camera_count; ++i) {
+        const size_t used = strlen(list), wanted = strlen(scene->cameras[i].name) + 3;
+        if (used + wanted + 4 > sizeof list) {
+            strcat(list, " …");
+            break;
+        }
+        strcat(list, i ? ", " : "");
+        strcat(list, scene->cameras[i].name);
+    }
+    if (scene->camera_count == 0) return lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "no camera '%s': the scene has none", name);
+    return lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "no camera '%s'; there are: %s", name, list);
+}
+
+static lx_result find_camera(const lx_scene *scene, const char *name, lx_camera *out, lx_error *error)
+{
+    for (uint32_t i = 0; i < scene->camera_count; ++i)
+        if (strcmp(scene->cameras[i].name, name) == 0) {
+            *out = scene->cameras[i];
+            return LX_OK;
+        }
+    char *end;
+    const unsigned long index = strtoul(name, &end, 10);
+    if (end == name || *end || index >= scene->camera_count) return fail_camera(scene, name, error);
+    *out = scene->cameras[index];
+    return LX_OK;
+}
+
+lx_result lx_view_choose(const lx_scene *scene, const lx_render_desc *desc, lx_view_rays *out, lx_error *error)
+{
+    const float aspect = (float)desc->width / (float)desc->height;
+    lx_camera camera;
+    if (desc->camera) {
+        const lx_result result = find_camera(scene, desc->camera, &camera, error);
+        if (result != LX_OK) return result;
+    } else {
+        camera = scene->camera_count ? scene->cameras[0] : framing_camera(scene, aspect);
+    }
+    const lx_vec3 x = lx_normalize(lx_mat4_direction(camera.transform, (lx_vec3){1, 0, 0}));
+    const lx_vec3 y = lx_normalize(lx_mat4_direction(camera.transform, (lx_vec3){0, 1, 0}));
+    const lx_vec3 z = lx_normalize(lx_mat4_direction(camera.transform, (lx_vec3){0, 0, 1}));
+    const float half_height = camera.perspective ? tanf(camera.yfov / 2) : camera.ymag;
+    const float half_width = camera.perspective ? half_height * aspect : camera.ymag * aspect;
+    out->perspective = camera.perspective;
+    out->origin = lx_mat4_point(camera.transform, (lx_vec3){0, 0, 0});
+    out->forward = lx_neg(z);
+    out->right = lx_scale(x, 2 * half_width);
+    out->down = lx_scale(y, -2 * half_height);
+    out->corner = lx_add(lx_scale(x, -half_width), lx_scale(y, half_height));
+    if (camera.perspective)
+        out->corner = lx_add(out->corner, out->forward);
+    else
+        out->corner = lx_add(out->corner, out->origin);
+    return LX_OK;
+}
+
+lx_ray lx_view_ray(const lx_view_rays *view, float x, float y)
+{
+    const lx_vec3 p = lx_add(view->corner, lx_add(lx_scale(view->right, x), lx_scale(view->down, y)));
+    if (!view->perspective) return (lx_ray){.origin = p, .direction = view->forward, .t_max = INFINITY};
+    return (lx_ray){.origin = view->origin, .direction = lx_normalize(p), .t_max = INFINITY};
+}
