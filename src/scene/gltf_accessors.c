@@ -179,11 +179,7 @@ static uint32_t load_index(const uint8_t *bytes, uint32_t type)
     return type == type_u8 ? bytes[0] : type == type_u16 ? load_u16(bytes) : load_u32(bytes);
 }
 
-// Calls for each element, in order, dense ones first, then those that a sparse accessor replaces.
-typedef lx_result (*element_func)(void *user, const lx_gltf_accessor *accessor, uint32_t element, const uint8_t *bytes,
-                                  lx_error *error);
-
-static lx_result visit_dense(lx_gltf_reader *reader, const lx_gltf_accessor *a, element_func func, void *user,
+static lx_result visit_dense(lx_gltf_reader *reader, const lx_gltf_accessor *a, lx_gltf_element_func func, void *user,
                              lx_error *error)
 {
     if (a->view < 0 || a->count == 0) return LX_OK;
@@ -193,7 +189,7 @@ static lx_result visit_dense(lx_gltf_reader *reader, const lx_gltf_accessor *a, 
     return result;
 }
 
-static lx_result visit_sparse(lx_gltf_reader *reader, const lx_gltf_accessor *a, element_func func, void *user,
+static lx_result visit_sparse(lx_gltf_reader *reader, const lx_gltf_accessor *a, lx_gltf_element_func func, void *user,
                               lx_error *error)
 {
     const lx_gltf_sparse *s = &a->sparse;
@@ -212,7 +208,8 @@ static lx_result visit_sparse(lx_gltf_reader *reader, const lx_gltf_accessor *a,
     return result;
 }
 
-static lx_result visit(lx_gltf_reader *reader, const lx_gltf_accessor *a, element_func func, void *user, lx_error *error)
+lx_result lx_gltf_visit_elements(lx_gltf_reader *reader, const lx_gltf_accessor *a, lx_gltf_element_func func, void *user,
+                                 lx_error *error)
 {
     const lx_result result = visit_dense(reader, a, func, user, error);
     return result == LX_OK ? visit_sparse(reader, a, func, user, error) : result;
@@ -240,7 +237,7 @@ lx_result lx_gltf_read_floats(lx_gltf_reader *reader, const lx_gltf_accessor *ac
     LX_TRY(lx_gltf_charge(reader, accessor->count, size, accessor->object.label, error));
     values = lx_calloc_array(accessor->count, size);
     if (!values) return lx_fail_memory(error, accessor->object.label);
-    LX_TRY(visit(reader, accessor, store_floats, values, error));
+    LX_TRY(lx_gltf_visit_elements(reader, accessor, store_floats, values, error));
     *out = values;
     values = NULL;
 cleanup:
@@ -276,7 +273,7 @@ lx_result lx_gltf_read_indices(lx_gltf_reader *reader, const lx_gltf_accessor *a
     LX_TRY(lx_gltf_charge(reader, accessor->count, sizeof(uint32_t), accessor->object.label, error));
     target.indices = lx_calloc_array(accessor->count, sizeof *target.indices);
     if (!target.indices) return lx_fail_memory(error, accessor->object.label);
-    LX_TRY(visit(reader, accessor, store_index, &target, error));
+    LX_TRY(lx_gltf_visit_elements(reader, accessor, store_index, &target, error));
     *out = target.indices;
     target.indices = NULL;
 cleanup:
