@@ -11,13 +11,17 @@
 static int print(const cli_session *session, const char *text, bool as_json)
 {
     json_t *const root = json_loads(text, 0, NULL);
-    json_t *const lines = json_array();
+    json_t *const warnings = json_array(), *const notes = json_array();
     int status = CLI_MACHINE_FAILED;
-    if (json_is_object(root) && lines) {
-        for (size_t i = 0; i < session->line_count; ++i) json_array_append_new(lines, json_string(session->lines[i]));
-        json_object_set(root, "warnings", lines);
+    if (json_is_object(root) && warnings && notes) {
+        for (size_t i = 0; i < session->line_count; ++i) {
+            const cli_log_line *const line = &session->lines[i];
+            json_array_append_new(line->level == LX_LOG_WARNING ? warnings : notes, json_string(line->text));
+        }
+        json_object_set(root, "warnings", warnings);
+        json_object_set(root, "notes", notes);
         if (as_json) {
-            json_dumpf(root, stdout, JSON_INDENT(2));
+            json_dumpf(root, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
             putchar('\n');
         } else {
             cli_print_document(root);
@@ -26,7 +30,8 @@ static int print(const cli_session *session, const char *text, bool as_json)
     } else {
         fprintf(stderr, "luxel: cannot format the description (out of memory?)\n");
     }
-    json_decref(lines);
+    json_decref(notes);
+    json_decref(warnings);
     json_decref(root);
     return status;
 }

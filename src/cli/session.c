@@ -11,32 +11,30 @@
 
 // --- Session ----------------------------------------------------------------------------------------------------------
 
-static void keep_line(cli_session *session, const char *level, const char *message)
+static void keep_line(cli_session *session, lx_log_level level, const char *message)
 {
     if (session->line_count == session->line_capacity) {
         const size_t capacity = session->line_capacity ? 2 * session->line_capacity : 16;
-        char **const lines = realloc(session->lines, capacity * sizeof *lines);
+        cli_log_line *const lines = realloc(session->lines, capacity * sizeof *lines);
         if (!lines) return; // a lost note is no reason to fail
         session->lines = lines;
         session->line_capacity = capacity;
     }
-    const size_t size = strlen(level) + strlen(message) + 3;
-    char *const line = malloc(size);
-    if (!line) return;
-    snprintf(line, size, "%s: %s", level, message);
-    session->lines[session->line_count++] = line;
+    char *const text = malloc(strlen(message) + 1);
+    if (!text) return;
+    strcpy(text, message);
+    session->lines[session->line_count++] = (cli_log_line){level, text};
 }
 
 static void on_log(void *user, lx_log_level level, const char *message)
 {
     cli_session *const session = user;
-    const char *const name = level == LX_LOG_WARNING ? "warning" : "note";
     if (level == LX_LOG_WARNING) ++session->warning_count;
     if (session->collect) {
-        keep_line(session, name, message);
+        keep_line(session, level, message);
     } else if (level == LX_LOG_WARNING || !session->quiet) {
         cli_progress_clear(&session->progress);
-        fprintf(stderr, "luxel: %s: %s\n", name, message);
+        fprintf(stderr, "luxel: %s: %s\n", level == LX_LOG_WARNING ? "warning" : "note", message);
     }
 }
 
@@ -58,7 +56,7 @@ void cli_session_close(cli_session *session)
 {
     cli_progress_clear(&session->progress);
     lx_context_destroy(session->context);
-    for (size_t i = 0; i < session->line_count; ++i) free(session->lines[i]);
+    for (size_t i = 0; i < session->line_count; ++i) free(session->lines[i].text);
     free(session->lines);
     session->context = NULL;
     session->lines = NULL;

@@ -8,6 +8,11 @@
 #include "luxel/bake.h"
 #include "luxel/baked.h"
 
+typedef struct cli_log_line {
+    lx_log_level level;
+    char *text; ///< Owned.
+} cli_log_line;
+
 typedef struct cli_session {
     bool quiet;                ///< --quiet: no progress, no notes. Warnings stay.
     lx_context_desc desc;      ///< --threads, --isa.
@@ -15,7 +20,7 @@ typedef struct cli_session {
     cli_progress progress;
     size_t warning_count;
     bool collect;              ///< Keep warnings and notes in `lines` instead of printing them (inspect).
-    char **lines;              ///< "warning: …", owned.
+    cli_log_line *lines;
     size_t line_count, line_capacity;
     double start_seconds;
 } cli_session;

@@ -327,7 +327,9 @@ def inspect_scene_and_folder():
         expect(word in text, "no '%s' in: %s" % (word, text))
     for what in ("room.glb", "room.baked"):
         document = json.loads(luxel("inspect", what, "--json").out)
-        expect(isinstance(document["layers"], list) and document["warnings"] == [], "%s: %s" % (what, document))
+        named = document["sources" if what == "room.glb" else "layers"]
+        expect([item["name"] for item in named] == ["lamp", "neon left", "neon right"], "%s: %s" % (what, named))
+        expect(document["warnings"] == [], "%s: %s" % (what, document["warnings"]))
 
 
 @case
