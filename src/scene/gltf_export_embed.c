@@ -4,7 +4,6 @@
 #include "image/image.h"
 
 #include <string.h>
-#include <strings.h>
 
 static const char *sniffed_type(const lx_bytes *content)
 {
@@ -20,7 +19,7 @@ static const char *sniffed_type(const lx_bytes *content)
 // "image/avif" from "data:image/avif;base64,…".
 static json_t *declared_type(const char *uri)
 {
-    if (strncasecmp(uri, "data:", 5) != 0) return NULL;
+    if (strncmp(uri, "data:", 5) != 0) return NULL;
     const size_t length = strcspn(uri + 5, ";,");
     return length ? json_stringn(uri + 5, length) : NULL;
 }
@@ -50,7 +49,7 @@ static lx_result set_type(json_t *image, const lx_bytes *content, const char *ur
 // An image without a name keeps its file's name as one.
 static lx_result set_name(json_t *image, const char *uri, lx_error *error)
 {
-    if (json_object_get(image, "name") || strncasecmp(uri, "data:", 5) == 0) return LX_OK;
+    if (json_object_get(image, "name") || strncmp(uri, "data:", 5) == 0) return LX_OK;
     return lx_export_set(image, "name", json_string(lx_path_name(uri)), error);
 }
 
