@@ -3,6 +3,8 @@
 
 #include <math.h>
 
+#define MAX_MEASURED (100ull << 20) // triangles in a scene beyond which advice is not worth the time it takes
+
 static double length_of_extent(const lx_scene *scene)
 {
     const lx_bounds *b = &scene->bounds;
@@ -70,6 +72,7 @@ static double power_of_light(const lx_scene *scene, const lx_light *light)
 static void advise_on_emitters(const lx_scene *scene, lx_light_units units)
 {
     double lamps = 0;
+    if (scene->triangle_count > MAX_MEASURED) return;
     for (uint32_t i = 0; i < scene->light_count; ++i) lamps += power_of_light(scene, &scene->lights[i]);
     const double emitters = lamps > 0 ? power_of_emitters(scene) : 0;
     if (!(emitters > 0) || emitters >= 0.01 * lamps) return;

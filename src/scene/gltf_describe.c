@@ -16,7 +16,7 @@ static const char *const alpha_names[] = {"OPAQUE", "MASK", "BLEND"};
 
 // json_pack and friends take over what they are given and pass NULL on, so lack of memory shows at the end.
 
-// The shortest decimal that reads back as the same float: 0.1, not 0.10000000149.
+// The shortest decimal that reads back as the same float: 0.1, not 0.10000000149. json_dumps prints 9 digits.
 static json_t *number(float value)
 {
     char text[32];
@@ -136,7 +136,7 @@ lx_result lx_scene_describe(const lx_scene *scene, char **out_json, lx_error *er
     DESCRIBE_ALL(root, "cameras", scene->camera_count, scene->cameras, describe_camera);
     DESCRIBE_ALL(root, "materials", scene->material_count, scene->materials, describe_material);
     failed |= json_object_set_new(root, "warnings", describe_warnings(scene)) != 0;
-    char *text = failed ? NULL : json_dumps(root, JSON_INDENT(2) | JSON_PRESERVE_ORDER);
+    char *text = failed ? NULL : json_dumps(root, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
     json_decref(root);
     // Copied, so that lx_text_free need not know where texts come from.
     *out_json = text ? lx_strdup(text) : NULL;

@@ -10,9 +10,11 @@
 
 #include <string.h>
 
-// Decoded data may be this many times as large as the largest file that is allowed: enough for any honest scene, and a bound
-// for files of a few lines that ask for thousands of copies of one mesh.
-enum { decoded_per_file_byte = 16 };
+// What decoding may allocate: a basis that holds any honest texture, and so much per byte of input; and never more than so many
+// times the largest file that is allowed. A file of a few lines can ask for thousands of copies of one mesh, or for a mesh of
+// two thousand million zeros.
+#define BASE_ALLOWANCE (2ull << 30)
+enum { allowance_per_byte = 64, allowance_per_limit_byte = 16 };
 
 static const struct {
     const char *array, *element;
@@ -32,6 +34,14 @@ lx_result lx_gltf_element(const lx_gltf_reader *reader, lx_gltf_kind kind, uint3
     json_t *json = json_array_get(reader->elements[kind], index);
     *out = lx_gltf_object_of(json, kinds[kind].element, index);
     return json_is_object(json) ? LX_OK : lx_fail(error, LX_ERROR_FORMAT, "%s: not an object", out->label);
+}
+
+void lx_gltf_grant(lx_gltf_reader *reader, size_t input_bytes)
+{
+    uint64_t grant = input_bytes > UINT64_MAX / allowance_per_byte ? UINT64_MAX : (uint64_t)input_bytes * allowance_per_byte;
+    if (grant > reader->memory_reserve) grant = reader->memory_reserve;
+    reader->memory_reserve -= grant;
+    reader->memory_left += grant;
 }
 
 lx_result lx_gltf_charge(lx_gltf_reader *reader, uint64_t count, size_t size, const char *label, lx_error *error)
@@ -94,6 +104,7 @@ static lx_result read_scene(lx_gltf_reader *reader, const void *data, size_t siz
     LX_TRY(lx_gltf_load_textures(reader, error));
     LX_TRY(lx_gltf_load_materials(reader, error));
     LX_TRY(lx_gltf_check_meshes(reader, error));
+    LX_TRY(lx_gltf_check_references(reader, error));
     LX_TRY(lx_gltf_load_nodes(reader, error));
     LX_TRY(lx_gltf_load_instances(reader, error));
     LX_TRY(lx_gltf_load_images(reader, error));
@@ -128,12 +139,14 @@ lx_result lx_gltf_import(lx_context *context, const char *name, const char *fold
         .log = context->log,
         .folder = folder,
         .max_file_bytes = desc->max_file_bytes,
-        .memory_left = desc->max_file_bytes > UINT64_MAX / decoded_per_file_byte
-                           ? UINT64_MAX
-                           : (uint64_t)desc->max_file_bytes * decoded_per_file_byte,
+        .memory_reserve = desc->max_file_bytes > UINT64_MAX / allowance_per_limit_byte
+                              ? UINT64_MAX
+                              : (uint64_t)desc->max_file_bytes * allowance_per_limit_byte,
         .emission_scale = desc->light_units == LX_LIGHT_UNITS_BLENDER ? 683.0f : 1.0f,
         .default_material = -1,
     };
+    lx_gltf_grant(&reader, BASE_ALLOWANCE / allowance_per_byte);
+    lx_gltf_grant(&reader, size);
     reader.scene = lx_calloc_array(1, sizeof *reader.scene);
     if (!reader.scene) {
         result = lx_fail_memory(error, "scene");

@@ -8,7 +8,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#define MAX_TRIANGLES (1ull << 31) // of all instances; indices of triangles stay below 2^31 everywhere
+#define MAX_TRIANGLES (1ull << 31)  // of all instances; indices of triangles stay below 2^31 everywhere
+#define MAX_MEASURED (100ull << 20) // triangles whose corners are all looked at; the boxes of later instances are looser
 
 static lx_result add_surfaces(lx_gltf_reader *reader, lx_instance *instance, uint32_t instance_index, int8_t transparent,
                               lx_error *error)
@@ -210,37 +211,59 @@ static lx_result note_movers(const lx_gltf_reader *reader, lx_error *error)
     return LX_OK;
 }
 
-// World bounds of an instance by the vertices that its triangles use. False: one of them is NaN or infinite there.
-static bool world_bounds(const lx_scene *scene, const lx_instance *instance, lx_bounds *bounds)
+// Bounds of a mesh by the vertices that its triangles use, transformed. False: one of them is NaN or infinite there.
+static bool mesh_bounds(const lx_scene *scene, const lx_mesh *mesh, lx_mat4 transform, lx_bounds *bounds)
 {
-    const lx_mesh *mesh = &scene->meshes[instance->mesh];
     *bounds = lx_bounds_empty();
     for (uint32_t i = 0; i < mesh->primitive_count; ++i) {
         const lx_primitive *p = &scene->primitives[mesh->first_primitive + i];
         for (size_t k = 0; k < 3 * (size_t)p->triangle_count; ++k) {
-            const lx_vec3 world = lx_mat4_point(instance->transform, p->positions[p->indices[k]]);
-            if (!lx_is_finite3(world)) return false;
-            lx_bounds_add(bounds, world);
+            const lx_vec3 point = lx_mat4_point(transform, p->positions[p->indices[k]]);
+            if (!lx_is_finite3(point)) return false;
+            lx_bounds_add(bounds, point);
         }
     }
     return true;
 }
 
-static lx_result measure(lx_gltf_reader *reader, lx_error *error)
+// The same from the corners of the mesh's own box: looser, but at a cost that does not grow with the mesh. All partial sums for
+// points in the box lie between those for its corners, so what is finite at the corners is finite inside.
+static bool corner_bounds(const lx_bounds *local, lx_mat4 transform, lx_bounds *bounds)
 {
-    lx_scene *scene = reader->scene;
+    *bounds = lx_bounds_empty();
+    for (int i = 0; i < 8; ++i) {
+        const lx_vec3 corner = {i & 1 ? local->high.x : local->low.x, i & 2 ? local->high.y : local->low.y,
+                                i & 4 ? local->high.z : local->low.z};
+        const lx_vec3 point = lx_mat4_point(transform, corner);
+        if (!lx_is_finite3(point)) return false;
+        lx_bounds_add(bounds, point);
+    }
+    return true;
+}
+
+static uint64_t mesh_triangles(const lx_scene *scene, const lx_mesh *mesh)
+{
+    uint64_t count = 0;
+    for (uint32_t p = 0; p < mesh->primitive_count; ++p) count += scene->primitives[mesh->first_primitive + p].triangle_count;
+    return count;
+}
+
+// Totals over the instances, with the box and the size of each mesh at hand.
+static lx_result sum_up(lx_scene *scene, const lx_bounds *boxes, const uint64_t *sizes, lx_error *error)
+{
     uint64_t triangles = 0;
     for (uint32_t i = 0; i < scene->instance_count; ++i) {
         const lx_instance *instance = &scene->instances[i];
-        const lx_mesh *mesh = &scene->meshes[instance->mesh];
-        uint64_t count = 0;
-        for (uint32_t p = 0; p < mesh->primitive_count; ++p) count += scene->primitives[mesh->first_primitive + p].triangle_count;
+        const uint64_t count = sizes[instance->mesh];
         triangles += count;
         if (triangles > MAX_TRIANGLES)
             return lx_fail(error, LX_ERROR_LIMIT, "node %u '%.60s': more than 2^31 triangles in all instances", instance->node,
                            instance->name);
         lx_bounds bounds;
-        if (!world_bounds(scene, instance, &bounds))
+        const bool finite = triangles <= MAX_MEASURED
+                                ? mesh_bounds(scene, &scene->meshes[instance->mesh], instance->transform, &bounds)
+                                : corner_bounds(&boxes[instance->mesh], instance->transform, &bounds);
+        if (!finite)
             return lx_fail(error, LX_ERROR_FORMAT, "node %u '%.60s': its vertices are not finite in the world", instance->node,
                            instance->name);
         if (!instance->is_static) continue;
@@ -249,6 +272,21 @@ static lx_result measure(lx_gltf_reader *reader, lx_error *error)
         lx_bounds_add(&scene->bounds, bounds.high);
     }
     return LX_OK;
+}
+
+static lx_result measure(lx_scene *scene, lx_error *error)
+{
+    lx_bounds *boxes = lx_malloc_array(scene->mesh_count, sizeof *boxes);
+    uint64_t *sizes = lx_malloc_array(scene->mesh_count, sizeof *sizes);
+    lx_result result = boxes && sizes ? LX_OK : lx_fail_memory(error, "bounds");
+    for (uint32_t i = 0; result == LX_OK && i < scene->mesh_count; ++i) {
+        mesh_bounds(scene, &scene->meshes[i], lx_mat4_identity(), &boxes[i]); // finite: the accessors were
+        sizes[i] = mesh_triangles(scene, &scene->meshes[i]);
+    }
+    if (result == LX_OK) result = sum_up(scene, boxes, sizes, error);
+    lx_free(boxes);
+    lx_free(sizes);
+    return result;
 }
 
 lx_result lx_gltf_load_instances(lx_gltf_reader *reader, lx_error *error)
@@ -265,7 +303,7 @@ lx_result lx_gltf_load_instances(lx_gltf_reader *reader, lx_error *error)
     if (reader->scene->instance_count == 0)
         return lx_fail(error, LX_ERROR_FORMAT, "scene: no mesh with triangles in it, so there is nothing to bake");
     LX_TRY(note_movers(reader, error));
-    LX_TRY(measure(reader, error));
+    LX_TRY(measure(reader->scene, error));
 cleanup:
     return result;
 }

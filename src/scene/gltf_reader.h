@@ -69,7 +69,8 @@ typedef struct lx_gltf_reader {
     lx_scene *scene;    ///< Under construction; owns all results.
     const char *folder; ///< NULL: no external files.
     size_t max_file_bytes;
-    uint64_t memory_left; ///< What decoding may still allocate, so that a small file cannot ask for all memory.
+    uint64_t memory_left;    ///< What decoding may still allocate, so that a small file cannot ask for all memory.
+    uint64_t memory_reserve; ///< What more input may add to it.
     float emission_scale;
 
     lx_gltf_object root;
@@ -99,6 +100,8 @@ typedef struct lx_gltf_reader {
 /// The element of that kind; it must be an object.
 lx_result lx_gltf_element(const lx_gltf_reader *reader, lx_gltf_kind kind, uint32_t index, lx_gltf_object *out,
                           lx_error *error);
+/// Input of so many bytes was read: decoding may allocate in proportion.
+void lx_gltf_grant(lx_gltf_reader *reader, size_t input_bytes);
 /// Takes count × size bytes from what decoding may allocate; LX_ERROR_LIMIT names `label` when that is used up.
 lx_result lx_gltf_charge(lx_gltf_reader *reader, uint64_t count, size_t size, const char *label, lx_error *error);
 /// The string in the scene's arena; "" for NULL.
@@ -115,7 +118,7 @@ bool lx_gltf_uses_extension(const lx_gltf_reader *reader, const char *name);
 const char *lx_gltf_draco_advice(void);
 
 // gltf_uri.c: the content of a data: URI or of a file in the scene's folder.
-lx_result lx_gltf_load_uri(const lx_gltf_reader *reader, const lx_gltf_object *object, const char *uri, lx_bytes *out,
+lx_result lx_gltf_load_uri(lx_gltf_reader *reader, const lx_gltf_object *object, const char *uri, lx_bytes *out,
                            lx_error *error);
 
 // gltf_buffers.c
@@ -139,6 +142,9 @@ lx_result lx_gltf_check_meshes(lx_gltf_reader *reader, lx_error *error);
 /// The scene's mesh for `file_mesh` at the weights of `node` (else the mesh's), read when first asked for.
 lx_result lx_gltf_mesh_index(lx_gltf_reader *reader, uint32_t file_mesh, const lx_gltf_object *node, uint32_t *out,
                              lx_error *error);
+
+// gltf_references.c: indices that the importer does not follow itself, but that export keeps.
+lx_result lx_gltf_check_references(lx_gltf_reader *reader, lx_error *error);
 
 // gltf_nodes.c
 /// a · b, summed in double.

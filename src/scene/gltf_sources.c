@@ -193,7 +193,7 @@ lx_result lx_gltf_load_sources(lx_gltf_reader *reader, lx_error *error)
     LX_TRY(add_lights(&list, error));
     LX_TRY(add_emitters(&list, error));
     if (list.renamed > 0)
-        lx_log_warning(reader->log, "node %u: another light has its name; it is called '%.80s' (%u such names in all)",
+        lx_log_warning(reader->log, "node %u: shares its name with another light and is called '%.80s' (%u such lights in all)",
                        list.first_renamed_node, list.first_renamed, list.renamed);
 cleanup:
     lx_name_set_release(&list.names);

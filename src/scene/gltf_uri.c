@@ -121,7 +121,7 @@ static lx_result check_relative(const lx_gltf_object *object, const char *uri, c
     return lx_fail(error, LX_ERROR_FORMAT, "%s: URI '%.200s' %s", object->label, uri, problem);
 }
 
-static lx_result load_file(const lx_gltf_reader *reader, const lx_gltf_object *object, const char *relative, lx_bytes *out,
+static lx_result load_file(lx_gltf_reader *reader, const lx_gltf_object *object, const char *relative, lx_bytes *out,
                            lx_error *error)
 {
     char *path = lx_path_join(reader->folder, relative);
@@ -132,13 +132,14 @@ static lx_result load_file(const lx_gltf_reader *reader, const lx_gltf_object *o
                          object->label, relative);
     } else {
         result = lx_file_read(path, reader->max_file_bytes, out, error);
-        if (result != LX_OK) lx_error_prefix(error, "%s: file '%.200s'", object->label, relative);
+        if (result == LX_OK) lx_gltf_grant(reader, out->size);
+        else lx_error_prefix(error, "%s: file '%.200s'", object->label, relative);
     }
     lx_free(path);
     return result;
 }
 
-lx_result lx_gltf_load_uri(const lx_gltf_reader *reader, const lx_gltf_object *object, const char *uri, lx_bytes *out,
+lx_result lx_gltf_load_uri(lx_gltf_reader *reader, const lx_gltf_object *object, const char *uri, lx_bytes *out,
                            lx_error *error)
 {
     if (strncmp(uri, "data:", 5) == 0) return load_data_uri(reader, object, uri, out, error);
