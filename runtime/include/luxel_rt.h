@@ -68,6 +68,7 @@ typedef enum lxrt_kind {
     LXRT_KIND_POINT, LXRT_KIND_SPOT, LXRT_KIND_DIRECTIONAL, LXRT_KIND_RECT, LXRT_KIND_DISK,
     LXRT_KIND_EMISSIVE, ///< An emissive material on one node.
     LXRT_KIND_SKY,
+    LXRT_KIND_COMBINED, ///< Of a layer alone: all sources together, at their authored colours.
 } lxrt_kind;
 
 typedef struct lxrt_layer {

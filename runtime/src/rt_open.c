@@ -157,7 +157,7 @@ static int check_layers(const lxrt_pack *pack)
         const unsigned char *layer = lxrt_element(&pack->layers, i);
         lxrt_color color;
         if (!is_name(pack, layer) || !are_finite(layer + 8, 5) || !is_scale(lxrt_load_f32(layer + 24)) ||
-            !read_authored_color(layer, &color) || lxrt_load_u32(layer + 28) > LXRT_KIND_SKY || lxrt_load_u32(layer + 32) > 1)
+            !read_authored_color(layer, &color) || lxrt_load_u32(layer + 28) > LXRT_KIND_COMBINED || lxrt_load_u32(layer + 32) > 1)
             return 0;
     }
     return 1;

@@ -5,9 +5,11 @@
 #include "base/file.h"
 #include "scene/scene.h"
 
+enum { lx_pack_kind_combined = LX_SOURCE_SKY + 1 }; ///< A layer of all sources at their authored colours.
+
 typedef struct lx_pack_layer {
     const char *name;
-    lx_source_kind kind; ///< Of its first source.
+    uint32_t kind;       ///< lx_source_kind of its first source, or lx_pack_kind_combined.
     lx_light_mode mode;
     float color[3];      ///< Authored; c = color × intensity.
     float intensity;

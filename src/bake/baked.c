@@ -1,0 +1,353 @@
+// Baked folders: opening, with or without their scene, and composing.
+#include "bake/baked.h"
+
+#include "base/context.h"
+#include "base/error.h"
+#include "store/folder.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+static const size_t max_manifest_bytes = (size_t)1 << 28;
+static const size_t max_pack_bytes = SIZE_MAX / 4;
+
+bool lx_baked_is_folder(const char *path)
+{
+    return lx_folder_is_baked(path);
+}
+
+// ---- opening
+
+static lx_result open_manifest(lx_baked *baked, lx_error *error)
+{
+    lx_result result = LX_OK;
+    lx_bytes text = {0};
+    char *path = lx_path_join(baked->folder, LX_MANIFEST_NAME);
+    if (!path) return lx_fail_memory(error, "path");
+    LX_TRY(lx_file_read(path, max_manifest_bytes, &text, error));
+    LX_TRY(lx_manifest_read((const char *)text.data, text.size, &baked->manifest, error));
+cleanup:
+    if (result != LX_OK) lx_error_prefix(error, "%s", path);
+    lx_bytes_release(&text);
+    lx_free(path);
+    return result;
+}
+
+// "folder/name", refusing names that lead out of the folder through a symbolic link. (The manifest's reader has checked the text.)
+static lx_result path_inside(const lx_baked *baked, const char *name, char **out, lx_error *error)
+{
+    char *path = lx_path_join(baked->folder, name);
+    if (!path) return lx_fail_memory(error, "path");
+    if (lx_path_exists(path) && !lx_path_is_inside(path, baked->folder)) {
+        lx_fail(error, LX_ERROR_FORMAT, "%s: lies outside of the folder", path);
+        lx_free(path);
+        return LX_ERROR_FORMAT;
+    }
+    *out = path;
+    return LX_OK;
+}
+
+static lx_result check_pack(const lx_baked *baked, lx_error *error)
+{
+    const lx_manifest *manifest = &baked->manifest;
+    lxrt_info info;
+    lxrt_get_info(baked->pack, &info);
+    bool fits = info.page_count == manifest->page_count && info.layer_count == manifest->layer_count;
+    for (uint32_t i = 0; fits && i < info.page_count; ++i)
+        fits = manifest->pages[i].width == info.page_size && manifest->pages[i].height == info.page_size;
+    for (uint32_t i = 0; fits && i < info.layer_count; ++i) {
+        lxrt_layer layer;
+        fits = lxrt_get_layer_info(baked->pack, i, &layer) == LXRT_OK && strcmp(layer.name, manifest->layers[i].name) == 0;
+    }
+    return fits ? LX_OK : lx_fail(error, LX_ERROR_FORMAT, "does not fit " LX_MANIFEST_NAME ": pages or layers differ");
+}
+
+static lx_result open_pack(lx_baked *baked, lx_error *error)
+{
+    lx_result result = LX_OK;
+    char *path = NULL;
+    LX_TRY(path_inside(baked, baked->manifest.pack, &path, error));
+    result = lx_file_read(path, max_pack_bytes, &baked->pack_data, error);
+    if (result == LX_OK) {
+        const lx_bytes *data = &baked->pack_data;
+        size_t needed = 0;
+        lxrt_result rt = lxrt_memory_bytes(data->data, data->size, &needed);
+        if (rt == LXRT_OK) {
+            baked->pack_memory = lx_malloc_array(needed, 1);
+            if (baked->pack_memory) rt = lxrt_open(data->data, data->size, baked->pack_memory, needed, &baked->pack);
+        }
+        if (rt != LXRT_OK)
+            result = lx_fail(error, rt == LXRT_ERROR_VERSION ? LX_ERROR_UNSUPPORTED : LX_ERROR_FORMAT, "%s", lxrt_result_name(rt));
+        else if (!baked->pack_memory)
+            result = lx_fail_memory(error, "pack");
+        else if (baked->manifest.pack_hash && lx_content_hash(data->data, data->size) != baked->manifest.pack_hash)
+            result = lx_fail(error, LX_ERROR_FORMAT, "is not the file that " LX_MANIFEST_NAME " was written for (hashes differ)");
+        else
+            result = check_pack(baked, error);
+    }
+    if (result != LX_OK) lx_error_prefix(error, "%s", path);
+cleanup:
+    lx_free(path);
+    return result;
+}
+
+// ---- the scene again
+
+static void release_atlas(lx_atlas *atlas)
+{
+    if (!atlas) return;
+    for (uint32_t i = 0; atlas->primitives && i < atlas->scene->primitive_count; ++i) lx_free(atlas->primitives[i].corner_uv);
+    lx_free(atlas->primitives);
+    lx_free(atlas->meshes);
+    lx_free(atlas->rects);
+    lx_free(atlas);
+}
+
+static lx_result create_atlas(lx_baked *baked, lx_error *error)
+{
+    const lx_scene *scene = baked->scene;
+    lx_atlas *atlas = baked->atlas = lx_calloc_array(1, sizeof *atlas);
+    if (!atlas) return lx_fail_memory(error, "atlas");
+    *atlas = (lx_atlas){
+        .scene = scene,
+        .page_size = lx_baked_page_size(baked),
+        .page_count = lx_baked_page_count(baked),
+        .padding = baked->manifest.padding,
+        .texels_per_m = baked->manifest.texels_per_m,
+        .primitives = lx_calloc_array(scene->primitive_count, sizeof *atlas->primitives),
+        .meshes = lx_calloc_array(scene->mesh_count, sizeof *atlas->meshes),
+        .rects = lx_calloc_array(scene->instance_count, sizeof *atlas->rects),
+    };
+    return atlas->primitives && atlas->meshes && atlas->rects ? LX_OK : lx_fail_memory(error, "atlas");
+}
+
+static lx_result read_corners(lx_baked *baked, const lx_instance *instance, uint32_t texcoord, lx_error *error)
+{
+    const lx_scene *scene = baked->scene;
+    const lx_mesh *mesh = &scene->meshes[instance->mesh];
+    for (uint32_t i = mesh->first_primitive; i < mesh->first_primitive + mesh->primitive_count; ++i) {
+        const lx_primitive *primitive = &scene->primitives[i];
+        lx_atlas_primitive *out = &baked->atlas->primitives[i];
+        if (out->corner_uv || scene->materials[primitive->material].unlit) continue;
+        const lx_vec2 *uv = texcoord < lx_texcoord_sets ? primitive->texcoords[texcoord] : NULL;
+        if (!uv) {
+            lx_log_warning(scene->context->log, "%s: mesh '%s' has no readable TEXCOORD_%u and shows without its lightmap", scene->path,
+                           mesh->name, texcoord);
+            return LX_OK;
+        }
+        out->corner_uv = lx_malloc_array((size_t)primitive->triangle_count * 3, sizeof *out->corner_uv);
+        if (!out->corner_uv) return lx_fail_memory(error, "atlas");
+        for (size_t corner = 0; corner < (size_t)primitive->triangle_count * 3; ++corner)
+            out->corner_uv[corner] = uv[primitive->indices[corner]];
+    }
+    return LX_OK;
+}
+
+static lx_result rebuild_atlas(lx_baked *baked, lx_error *error)
+{
+    const lx_scene *scene = baked->scene;
+    lx_result result = create_atlas(baked, error);
+    for (uint32_t i = 0; result == LX_OK && i < scene->instance_count; ++i) {
+        const lx_instance *instance = &scene->instances[i];
+        lxrt_rect rect;
+        if (lxrt_find_rect(baked->pack, instance->node, instance->gpu_instance, &rect) != LXRT_OK) continue;
+        lx_atlas_rect *out = &baked->atlas->rects[i];
+        *out = (lx_atlas_rect){
+            .used = true,
+            .page = rect.page,
+            .x = rect.x,
+            .y = rect.y,
+            .width = rect.width,
+            .height = rect.height,
+        };
+        memcpy(out->scale, rect.scale, sizeof out->scale);
+        memcpy(out->offset, rect.offset, sizeof out->offset);
+        baked->atlas->meshes[instance->mesh] = (lx_atlas_mesh){.existing = true, .texcoord = rect.texcoord};
+        result = read_corners(baked, instance, rect.texcoord, error);
+    }
+    return result;
+}
+
+static lx_source_use find_use(const lx_baked *baked, const char *name, bool is_sky)
+{
+    lxrt_source source;
+    for (uint32_t i = 0; lxrt_get_source(baked->pack, i, &source) == LXRT_OK; ++i)
+        if ((source.kind == LXRT_KIND_SKY) == is_sky && strcmp(source.name, name) == 0)
+            return (lx_source_use){(int32_t)source.layer, {source.weight[0], source.weight[1], source.weight[2]}, true};
+    return (lx_source_use){.layer = -1};
+}
+
+static lx_result find_uses(lx_baked *baked, lx_error *error)
+{
+    const lx_scene *scene = baked->scene;
+    baked->use_count = scene->source_count + 1;
+    baked->uses = lx_calloc_array(baked->use_count, sizeof *baked->uses);
+    if (!baked->uses) return lx_fail_memory(error, "sources");
+    for (uint32_t i = 0; i < scene->source_count; ++i) {
+        baked->uses[i] = find_use(baked, scene->sources[i].name, false);
+        baked->uses[i].direct = scene->sources[i].mode != LX_MODE_MIXED;
+    }
+    baked->uses[scene->source_count] = find_use(baked, "sky", true);
+    return LX_OK;
+}
+
+static lx_result open_sky(lx_baked *baked, lx_error *error)
+{
+    const lx_manifest_sky *sky = &baked->manifest.sky;
+    baked->sky = (lx_sky_desc){.intensity = 1};
+    if (!baked->manifest.has_sky) return LX_OK;
+    const lx_result result = path_inside(baked, sky->file, &baked->sky_path, error);
+    if (result != LX_OK) return result;
+    baked->sky = (lx_sky_desc){
+        .color = {sky->color[0], sky->color[1], sky->color[2]},
+        .file = baked->sky_path,
+        .rotation_deg = sky->rotation_deg,
+        .intensity = sky->intensity,
+    };
+    return LX_OK;
+}
+
+static lx_result check_scene_hash(const lx_baked *baked, const char *path, lx_error *error)
+{
+    lx_bytes bytes = {0};
+    if (!baked->manifest.scene_hash) return LX_OK;
+    const lx_result result = lx_file_read(path, SIZE_MAX / 4, &bytes, error);
+    if (result == LX_OK && lx_content_hash(bytes.data, bytes.size) != baked->manifest.scene_hash)
+        lx_log_warning(baked->context->log, "%s: was changed since the bake; what moved keeps its old light", path);
+    lx_bytes_release(&bytes);
+    if (result != LX_OK) lx_error_prefix(error, "%s", path);
+    return result;
+}
+
+static lx_result open_scene(lx_baked *baked, lx_error *error)
+{
+    lx_result result = LX_OK;
+    char *path = NULL;
+    if (!baked->manifest.scene) return lx_fail(error, LX_ERROR_FORMAT, "%s: has no scene", baked->folder);
+    LX_TRY(path_inside(baked, baked->manifest.scene, &path, error));
+    LX_TRY(check_scene_hash(baked, path, error));
+    LX_TRY(lx_scene_load(baked->context, path, NULL, &baked->scene, error));
+    LX_TRY(rebuild_atlas(baked, error));
+    LX_TRY(find_uses(baked, error));
+    LX_TRY(open_sky(baked, error));
+cleanup:
+    lx_free(path);
+    return result;
+}
+
+lx_result lx_baked_open(lx_context *context, const char *folder, bool with_scene, lx_baked **out_baked, lx_error *error)
+{
+    lx_result result = LX_OK;
+    lx_baked *baked = lx_calloc_array(1, sizeof *baked);
+    if (!baked) return lx_fail_memory(error, "baked folder");
+    baked->context = context;
+    baked->folder = lx_strdup(folder);
+    if (!baked->folder) {
+        result = lx_fail_memory(error, "path");
+        goto cleanup;
+    }
+    if (!lx_folder_is_baked(folder)) {
+        result = lx_fail(error, LX_ERROR_FORMAT, "%s: %s", folder,
+                         lx_path_is_folder(folder) ? "holds no " LX_MANIFEST_NAME : "is no baked folder");
+        goto cleanup;
+    }
+    LX_TRY(open_manifest(baked, error));
+    LX_TRY(open_pack(baked, error));
+    if (with_scene) LX_TRY(open_scene(baked, error));
+    *out_baked = baked;
+    baked = NULL;
+cleanup:
+    lx_baked_destroy(baked);
+    return result;
+}
+
+void lx_baked_destroy(lx_baked *baked)
+{
+    if (!baked) return;
+    release_atlas(baked->atlas);
+    lx_scene_destroy(baked->scene);
+    lx_free(baked->uses);
+    lx_free(baked->sky_path);
+    lx_free(baked->pack_memory);
+    lx_bytes_release(&baked->pack_data);
+    lx_manifest_release(&baked->manifest);
+    lx_free(baked->folder);
+    lx_free(baked);
+}
+
+// ---- looking inside
+
+uint32_t lx_baked_page_count(const lx_baked *baked)
+{
+    return baked->manifest.page_count;
+}
+
+uint32_t lx_baked_page_size(const lx_baked *baked)
+{
+    lxrt_info info;
+    lxrt_get_info(baked->pack, &info);
+    return info.page_size;
+}
+
+uint32_t lx_baked_layer_count(const lx_baked *baked)
+{
+    return baked->manifest.layer_count;
+}
+
+const char *lx_baked_layer_name(const lx_baked *baked, uint32_t layer)
+{
+    return layer < baked->manifest.layer_count ? baked->manifest.layers[layer].name : "";
+}
+
+void lx_baked_get_layer(const lx_baked *baked, uint32_t layer, float out_rgb[3])
+{
+    if (lxrt_get_layer(baked->pack, layer, out_rgb) != LXRT_OK) memset(out_rgb, 0, 3 * sizeof *out_rgb);
+}
+
+void lx_baked_set_layer(lx_baked *baked, uint32_t layer, const float rgb[3])
+{
+    lxrt_set_layer(baked->pack, layer, rgb); // refuses what it cannot sum; the layer keeps its colour then
+}
+
+lx_rgb lx_baked_source_strength(const lx_baked *baked, uint32_t index)
+{
+    const lx_source_use *use = &baked->uses[index];
+    if (use->layer < 0) return (lx_rgb){0, 0, 0};
+    float c[3];
+    lx_baked_get_layer(baked, (uint32_t)use->layer, c);
+    return (lx_rgb){use->weight.r * c[0], use->weight.g * c[1], use->weight.b * c[2]};
+}
+
+lx_result lx_baked_compose(const lx_baked *baked, uint32_t page, float *out_rgb, lx_error *error)
+{
+    const uint32_t size = lx_baked_page_size(baked);
+    if (page >= baked->manifest.page_count)
+        return lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "%s: there is no page %u; it has %u", baked->folder, page,
+                       baked->manifest.page_count);
+    const lxrt_result rt = lxrt_compose(baked->pack, page, 0, 0, 0, size, size, out_rgb, 0);
+    return rt == LXRT_OK ? LX_OK : lx_fail(error, LX_ERROR_BACKEND, "%s: page %u: %s", baked->folder, page, lxrt_result_name(rt));
+}
+
+static uint64_t file_bytes(const lx_baked *baked, const char *name)
+{
+    char *path = name ? lx_path_join(baked->folder, name) : NULL;
+    FILE *file = path ? fopen(path, "rb") : NULL;
+    const long size = file && fseek(file, 0, SEEK_END) == 0 ? ftell(file) : -1;
+    if (file) fclose(file);
+    lx_free(path);
+    return size > 0 ? (uint64_t)size : 0;
+}
+
+lx_result lx_baked_describe(const lx_baked *baked, char **out_json, lx_error *error)
+{
+    const lx_manifest *manifest = &baked->manifest;
+    uint64_t *sizes = lx_calloc_array((size_t)manifest->file_count + 2, sizeof *sizes);
+    if (!sizes) return lx_fail_memory(error, "description");
+    sizes[0] = file_bytes(baked, manifest->scene);
+    sizes[1] = baked->pack_data.size;
+    for (uint32_t i = 0; i < manifest->file_count; ++i) sizes[2 + i] = file_bytes(baked, manifest->files[i].file);
+    const lx_result result = lx_manifest_write(manifest, sizes, out_json, error);
+    lx_free(sizes);
+    return result;
+}

@@ -1,0 +1,81 @@
+/// luxel.json: what is in a baked folder, for people and tools. The schema is docs/luxel.schema.json.
+#ifndef LX_STORE_MANIFEST_H
+#define LX_STORE_MANIFEST_H
+
+#include "base/file.h"
+#include "base/memory.h"
+
+enum { lx_manifest_version = 1 };
+
+typedef struct lx_manifest_page {
+    uint32_t width, height;
+    float coverage; ///< Covered share, 0…1.
+} lx_manifest_page;
+
+typedef struct lx_manifest_layer {
+    const char *name;
+    const char *kind; ///< "point", "spot", "directional", "rect", "disk", "emissive", "sky", "combined".
+    const char *node; ///< Of its first source; "" for the sky.
+    const char *unit; ///< "cd", "lx", "nt".
+    const char *mode; ///< "baked" or "mixed".
+    float color[3], intensity; ///< c = color × intensity, authored.
+    float scale; ///< KTX2 texels × scale = lux per unit light. Almost always 1 and left out then: only what is far too dark or bright
+                 ///< for half floats is scaled. (The pack has scales of its own; EXR and HDR hold physical values.)
+} lx_manifest_layer;
+
+typedef struct lx_manifest_file {
+    uint32_t page;
+    uint32_t layer;     ///< The one it holds; of an array: of its first slice, the others follow.
+    const char *format; ///< "ktx2", "exr", "hdr".
+    const char *file;
+} lx_manifest_file;
+
+typedef struct lx_manifest_sky {
+    const char *file; ///< Equirectangular picture; its radiance × color × intensity is the authored sky.
+    float color[3], rotation_deg, intensity;
+} lx_manifest_sky;
+
+typedef struct lx_manifest_bake {
+    uint32_t samples, bounces; ///< LX_BOUNCES_INF is written as "inf".
+    const char *integrator;
+    uint32_t seed;
+    const char *isa;
+    double seconds;
+    uint32_t threads;
+} lx_manifest_bake;
+
+/// Strings are never NULL unless said so, and borrowed when writing; a manifest that was read owns them in `strings`.
+typedef struct lx_manifest {
+    const char *generator;
+    const char *scene; ///< File name; NULL: none.
+    const char *pack;
+    uint32_t padding;
+    float texels_per_m;
+    lx_manifest_page *pages; ///< Arrays are owned.
+    lx_manifest_layer *layers;
+    lx_manifest_file *files;
+    uint32_t page_count, layer_count, file_count;
+    bool has_sky, has_view;
+    lx_manifest_sky sky;
+    float view_ev;
+    lx_manifest_bake bake;
+    uint64_t scene_hash, pack_hash; ///< lx_content_hash; 0: not known.
+    lx_arena strings;
+} lx_manifest;
+
+void lx_manifest_release(lx_manifest *manifest);
+
+/// FNV-1a of a file's bytes, never 0.
+uint64_t lx_content_hash(const void *data, size_t size);
+
+/// True if `path` is relative and stays below the folder it starts from: no "..", no backslash, no drive, nothing empty.
+bool lx_path_stays_inside(const char *path);
+
+/// JSON text, indented, ending in a newline; owned by the caller (lx_free). `sizes` (may be NULL) adds "sizes": bytes of each file
+/// named in the manifest, in the order scene, pack, files; 0 leaves one out.
+lx_result lx_manifest_write(const lx_manifest *manifest, const uint64_t *sizes, char **out_text, lx_error *error);
+
+/// Reads what lx_manifest_write writes; unknown fields are ignored. Hostile text gives an error that names the field.
+lx_result lx_manifest_read(const char *text, size_t size, lx_manifest *out, lx_error *error);
+
+#endif
