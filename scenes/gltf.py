@@ -61,10 +61,12 @@ def quat_mul(a, b):
     """First b, then a."""
     ax, ay, az, aw = a
     bx, by, bz, bw = b
-    return (aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-            aw * bw - ax * bx - ay * by - az * bz)
+    return (
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
+    )
 
 
 def quat_rotate(q, v):
@@ -196,8 +198,12 @@ def quad(width, height, fit=False):
     """A rectangle in the XY plane around the origin, facing +Z, four vertices."""
     x, y = width / 2, height / 2
     u, v = (1, 1) if fit else (width, height)
-    return Mesh([(-x, -y, 0), (x, -y, 0), (x, y, 0), (-x, y, 0)], [(0, 0, 1)] * 4,
-                [(0, v), (u, v), (u, 0), (0, 0)], [0, 1, 2, 0, 2, 3])
+    return Mesh(
+        [(-x, -y, 0), (x, -y, 0), (x, y, 0), (-x, y, 0)],
+        [(0, 0, 1)] * 4,
+        [(0, v), (u, v), (u, 0), (0, 0)],
+        [0, 1, 2, 0, 2, 3],
+    )
 
 
 def grid(width, height, nx, ny, fit=False):
@@ -251,8 +257,13 @@ def box(sx, sy, sz, center=(0, 0, 0), skip=""):
 
 def box_between(lo, hi, skip=""):
     """The box with these two corners."""
-    return box(hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2],
-               ((lo[0] + hi[0]) / 2, (lo[1] + hi[1]) / 2, (lo[2] + hi[2]) / 2), skip)
+    return box(
+        hi[0] - lo[0],
+        hi[1] - lo[1],
+        hi[2] - lo[2],
+        ((lo[0] + hi[0]) / 2, (lo[1] + hi[1]) / 2, (lo[2] + hi[2]) / 2),
+        skip,
+    )
 
 
 def lathe(profile, segments=24, crease=35.0):
@@ -322,8 +333,10 @@ def cylinder(radius, height, segments=24, top=None, caps=True):
 
 
 def sphere(radius, segments=24, rings=12):
-    prof = [(radius * math.sin(math.pi * k / rings), -radius * math.cos(math.pi * k / rings))
-            for k in range(rings + 1)]
+    prof = [
+        (radius * math.sin(math.pi * k / rings), -radius * math.cos(math.pi * k / rings))
+        for k in range(rings + 1)
+    ]
     prof[0], prof[-1] = (0, -radius), (0, radius)
     return lathe(prof, segments, 180.0 if rings > 2 else 35.0)
 
@@ -417,8 +430,11 @@ def _ears(poly):
             a, b, c = poly[i], poly[j], poly[l]
             if area(a, b, c) <= 1e-14:
                 continue
-            if any(area(a, b, poly[q]) >= 0 and area(b, c, poly[q]) >= 0 and area(c, a, poly[q]) >= 0
-                   for q in left if q not in (i, j, l) and poly[q] not in (a, b, c)):
+            if any(
+                area(a, b, poly[q]) >= 0 and area(b, c, poly[q]) >= 0 and area(c, a, poly[q]) >= 0
+                for q in left
+                if q not in (i, j, l) and poly[q] not in (a, b, c)
+            ):
                 continue
             out += [i, j, l]
             left.pop(k)
@@ -440,7 +456,7 @@ def extrude(outline, depth, crease=35.0, back=True):
             m.normals.append((0, 0, s))
             m.uvs.append((s * x, -y))
         for k in range(0, len(tris), 3):
-            a, b, c = (base + t for t in tris[k:k + 3])
+            a, b, c = (base + t for t in tris[k : k + 3])
             m.indices += [a, b, c] if s > 0 else [a, c, b]
     edge = []
     for k in range(n):
@@ -480,11 +496,13 @@ def png(width, height, pixels, channels=3):
     before = bytes(stride)
     raw = bytearray()
     for y in range(height):
-        row = pixels[y * stride:(y + 1) * stride]
+        row = pixels[y * stride : (y + 1) * stride]
         shifted = bytes(channels) + bytes(row[:-channels])
-        tries = [bytes(row),
-                 bytes((a - b) & 255 for a, b in zip(row, shifted)),
-                 bytes((a - b) & 255 for a, b in zip(row, before))]
+        tries = [
+            bytes(row),
+            bytes((a - b) & 255 for a, b in zip(row, shifted)),
+            bytes((a - b) & 255 for a, b in zip(row, before)),
+        ]
         cost = [sum(c if c < 128 else 256 - c for c in t) for t in tries]
         best = cost.index(min(cost))
         raw.append(best)
@@ -496,8 +514,12 @@ def png(width, height, pixels, channels=3):
 
     kind = {1: 0, 3: 2, 4: 6}[channels]
     head = struct.pack(">IIBBBBB", width, height, 8, kind, 0, 0, 0)
-    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) +
-            chunk(b"IDAT", zlib.compress(bytes(raw), 9)) + chunk(b"IEND", b""))
+    return (
+        b"\x89PNG\r\n\x1a\n"
+        + chunk(b"IHDR", head)
+        + chunk(b"IDAT", zlib.compress(bytes(raw), 9))
+        + chunk(b"IEND", b"")
+    )
 
 
 # --- the file ----------------------------------------------------------------------------------
@@ -512,8 +534,12 @@ class Gltf:
     FLOAT, USHORT, UINT = 5126, 5123, 5125
 
     def __init__(self, generator="luxel scenes/gltf.py"):
-        self.json = {"asset": {"version": "2.0", "generator": generator}, "scene": 0,
-                     "scenes": [{"nodes": []}], "nodes": []}
+        self.json = {
+            "asset": {"version": "2.0", "generator": generator},
+            "scene": 0,
+            "scenes": [{"nodes": []}],
+            "nodes": [],
+        }
         self.data = bytearray()
 
     # buffers
@@ -548,8 +574,12 @@ class Gltf:
         if component == self.FLOAT:
             flat = [c + 0.0 if abs(c) > 1e-9 else 0.0 for c in flat]  # no -0, no 1e-17 noise
         data = struct.pack("<%d%s" % (len(flat), code), *flat)
-        acc = {"bufferView": self.add_view(data, target), "componentType": component,
-               "count": len(values), "type": ("", "SCALAR", "VEC2", "VEC3", "VEC4")[width]}
+        acc = {
+            "bufferView": self.add_view(data, target),
+            "componentType": component,
+            "count": len(values),
+            "type": ("", "SCALAR", "VEC2", "VEC3", "VEC4")[width],
+        }
         if bounds:
             stored = struct.unpack("<%d%s" % (len(flat), code), data)
             acc["min"] = [min(stored[k::width]) for k in range(width)]
@@ -563,21 +593,42 @@ class Gltf:
         return self.add_png(name, png(width, height, bytes(pixels), channels), wrap, nearest)
 
     def add_png(self, name, data, wrap=True, nearest=False):
-        image = self._push("images", {"name": name, "mimeType": "image/png",
-                                      "bufferView": self.add_view(data)})
+        image = self._push(
+            "images", {"name": name, "mimeType": "image/png", "bufferView": self.add_view(data)}
+        )
         mode = 10497 if wrap else 33071
-        sampler = {"magFilter": 9728 if nearest else 9729, "minFilter": 9728 if nearest else 9987,
-                   "wrapS": mode, "wrapT": mode}
+        sampler = {
+            "magFilter": 9728 if nearest else 9729,
+            "minFilter": 9728 if nearest else 9987,
+            "wrapS": mode,
+            "wrapT": mode,
+        }
         known = self.json.setdefault("samplers", [])
         if sampler not in known:
             known.append(sampler)
-        return self._push("textures", {"name": name, "sampler": known.index(sampler),
-                                       "source": image})
+        return self._push("textures", {"name": name, "sampler": known.index(sampler), "source": image})
 
-    def add_material(self, name, base_color=(1, 1, 1), texture=None, roughness=0.9, metallic=0.0,
-                     emissive=None, emissive_texture=None, strength=1.0, alpha=None, cutoff=None,
-                     double_sided=False, transmission=0.0, transmission_texture=None, ior=None,
-                     unlit=False, texcoord=0, emissive_texcoord=0, extras=None):
+    def add_material(
+        self,
+        name,
+        base_color=(1, 1, 1),
+        texture=None,
+        roughness=0.9,
+        metallic=0.0,
+        emissive=None,
+        emissive_texture=None,
+        strength=1.0,
+        alpha=None,
+        cutoff=None,
+        double_sided=False,
+        transmission=0.0,
+        transmission_texture=None,
+        ior=None,
+        unlit=False,
+        texcoord=0,
+        emissive_texcoord=0,
+        extras=None,
+    ):
         """alpha: None (OPAQUE), "MASK" or "BLEND"; strength: nit, multiplies emissive x texture."""
         color = list(base_color) + ([1.0] if len(base_color) == 3 else [])
         pbr = {"baseColorFactor": color, "metallicFactor": metallic, "roughnessFactor": roughness}
@@ -601,7 +652,8 @@ class Gltf:
             ext["KHR_materials_transmission"] = {"transmissionFactor": transmission}
             if transmission_texture is not None:
                 ext["KHR_materials_transmission"]["transmissionTexture"] = self._info(
-                    transmission_texture, 0)
+                    transmission_texture, 0
+                )
         if ior is not None:
             ext["KHR_materials_ior"] = {"ior": ior}
         if unlit:
@@ -628,12 +680,17 @@ class Gltf:
         prims = []
         for m, material in parts:
             attributes = {"POSITION": self.add_accessor(m.positions, bounds=True)}
-            for key, values in (("NORMAL", m.normals), ("TEXCOORD_0", m.uvs),
-                                ("TEXCOORD_1", m.uv1), ("COLOR_0", m.colors)):
+            for key, values in (
+                ("NORMAL", m.normals),
+                ("TEXCOORD_0", m.uvs),
+                ("TEXCOORD_1", m.uv1),
+                ("COLOR_0", m.colors),
+            ):
                 if values:
                     if len(values) != len(m.positions):
-                        raise ValueError("%s: %d %s for %d positions" %
-                                         (name, len(values), key, len(m.positions)))
+                        raise ValueError(
+                            "%s: %d %s for %d positions" % (name, len(values), key, len(m.positions))
+                        )
                     attributes[key] = self.add_accessor(values)
             prim = {"attributes": attributes}
             if m.indices:
@@ -649,8 +706,9 @@ class Gltf:
 
     # lights, cameras, nodes
 
-    def add_light(self, kind, intensity, color=(1, 1, 1), name=None, range=None, inner=0.0,
-                  outer=45.0, extras=None):
+    def add_light(
+        self, kind, intensity, color=(1, 1, 1), name=None, range=None, inner=0.0, outer=45.0, extras=None
+    ):
         """kind: "point", "spot" (candela; half angles in degrees) or "directional" (lux)."""
         self._extension("KHR_lights_punctual")
         light = {"type": kind, "intensity": intensity, "color": list(color)}
@@ -659,8 +717,10 @@ class Gltf:
         if range is not None:
             light["range"] = range
         if kind == "spot":
-            light["spot"] = {"innerConeAngle": math.radians(inner),
-                             "outerConeAngle": math.radians(outer)}
+            light["spot"] = {
+                "innerConeAngle": math.radians(inner),
+                "outerConeAngle": math.radians(outer),
+            }
         if extras:
             light["extras"] = extras
         ext = self.json.setdefault("extensions", {})
@@ -675,8 +735,19 @@ class Gltf:
             lens["aspectRatio"] = aspect
         return self._push("cameras", {"name": name, "type": "perspective", "perspective": lens})
 
-    def add_node(self, name, mesh=None, light=None, camera=None, translation=None, rotation=None,
-                 scale=None, extras=None, parent=None, instances=None):
+    def add_node(
+        self,
+        name,
+        mesh=None,
+        light=None,
+        camera=None,
+        translation=None,
+        rotation=None,
+        scale=None,
+        extras=None,
+        parent=None,
+        instances=None,
+    ):
         """instances: [(translation, rotation, scale), ...] for EXT_mesh_gpu_instancing."""
         node = {"name": name}
         for key, value in (("mesh", mesh), ("camera", camera)):
@@ -695,9 +766,12 @@ class Gltf:
         if instances:
             self._extension("EXT_mesh_gpu_instancing")
             rows = list(zip(*instances))
-            ext["EXT_mesh_gpu_instancing"] = {"attributes": {
-                key: self.add_accessor([tuple(v) for v in rows[k]], target=None)
-                for k, key in enumerate(("TRANSLATION", "ROTATION", "SCALE"))}}
+            ext["EXT_mesh_gpu_instancing"] = {
+                "attributes": {
+                    key: self.add_accessor([tuple(v) for v in rows[k]], target=None)
+                    for k, key in enumerate(("TRANSLATION", "ROTATION", "SCALE"))
+                }
+            }
         if ext:
             node["extensions"] = ext
         if extras:
