@@ -14,6 +14,9 @@ typedef enum lx_view { LX_VIEW_LIT, LX_VIEW_LIGHTMAP, LX_VIEW_ALBEDO } lx_view;
 typedef struct lx_render_desc {
     uint32_t width, height;   ///< Default 1280 × 720.
     const char *camera;       ///< Name or index of a camera in the file; NULL (default): the first, else one that frames the scene.
+    bool look;                ///< Instead of a camera of the file: look from `eye` to `target`. Default false.
+    float eye[3], target[3];  ///< World, metres. +Y is up in the picture.
+    float yfov_deg;           ///< Vertical field of view of such a look. Default 60.
     uint32_t samples;         ///< Camera rays per pixel; reference: paths per pixel. Default 16.
     bool auto_exposure;       ///< Default true: log-average luminance at 0.18.
     float exposure_ev;        ///< Otherwise: pixel = sRGB(tone(2^EV · L)).

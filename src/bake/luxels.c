@@ -261,7 +261,7 @@ static lx_vec3 lift(const lx_tracer *tracer, const lx_fragment *f, const lx_vec3
     const float weight[3] = {1 - b.x - b.y, b.x, b.y};
     lx_vec3 shift = {0, 0, 0};
     for (int i = 0; i < 3; ++i) {
-        const float below = fminf(0, lx_dot(lx_sub(r->position, corner[i]), normal[i]));
+        const float below = lx_min(0, lx_dot(lx_sub(r->position, corner[i]), normal[i]));
         if (lx_dot(normal[i], r->geometric_normal) > 0) shift = lx_mad(shift, normal[i], -below * weight[i]);
     }
     if (!(lx_dot(shift, r->geometric_normal) > 0)) return r->position;

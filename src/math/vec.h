@@ -7,6 +7,10 @@
 
 #define LX_PI 3.14159265358979323846f
 
+// fminf and fmaxf are calls: they must treat NaN with care that only a library function gives. These are one instruction.
+static inline float lx_min(float a, float b) { return a < b ? a : b; }
+static inline float lx_max(float a, float b) { return a > b ? a : b; }
+
 typedef struct lx_vec2 { float x, y; } lx_vec2;
 typedef struct lx_vec3 { float x, y, z; } lx_vec3;
 typedef struct lx_vec4 { float x, y, z, w; } lx_vec4;
@@ -39,9 +43,9 @@ static inline lx_vec3 lx_cross(lx_vec3 a, lx_vec3 b)
 static inline float lx_length(lx_vec3 a) { return sqrtf(lx_dot(a, a)); }
 static inline float lx_distance(lx_vec3 a, lx_vec3 b) { return lx_length(lx_sub(a, b)); }
 static inline lx_vec3 lx_lerp(lx_vec3 a, lx_vec3 b, float t) { return lx_mad(lx_scale(a, 1 - t), b, t); }
-static inline lx_vec3 lx_min3(lx_vec3 a, lx_vec3 b) { return (lx_vec3){fminf(a.x, b.x), fminf(a.y, b.y), fminf(a.z, b.z)}; }
-static inline lx_vec3 lx_max3(lx_vec3 a, lx_vec3 b) { return (lx_vec3){fmaxf(a.x, b.x), fmaxf(a.y, b.y), fmaxf(a.z, b.z)}; }
-static inline float lx_max_abs(lx_vec3 a) { return fmaxf(fabsf(a.x), fmaxf(fabsf(a.y), fabsf(a.z))); }
+static inline lx_vec3 lx_min3(lx_vec3 a, lx_vec3 b) { return (lx_vec3){lx_min(a.x, b.x), lx_min(a.y, b.y), lx_min(a.z, b.z)}; }
+static inline lx_vec3 lx_max3(lx_vec3 a, lx_vec3 b) { return (lx_vec3){lx_max(a.x, b.x), lx_max(a.y, b.y), lx_max(a.z, b.z)}; }
+static inline float lx_max_abs(lx_vec3 a) { return lx_max(fabsf(a.x), lx_max(fabsf(a.y), fabsf(a.z))); }
 
 /// Unit vector of `a`, or `fallback` when `a` has no usable length. Scaled first: 1e-30 and 1e30 both work.
 static inline lx_vec3 lx_normalize_or(lx_vec3 a, lx_vec3 fallback)
@@ -70,7 +74,7 @@ static inline lx_rgb lx_rgb_grey(float v) { return (lx_rgb){v, v, v}; }
 static inline lx_rgb lx_rgb_add(lx_rgb a, lx_rgb b) { return (lx_rgb){a.r + b.r, a.g + b.g, a.b + b.b}; }
 static inline lx_rgb lx_rgb_mul(lx_rgb a, lx_rgb b) { return (lx_rgb){a.r * b.r, a.g * b.g, a.b * b.b}; }
 static inline lx_rgb lx_rgb_scale(lx_rgb a, float s) { return (lx_rgb){a.r * s, a.g * s, a.b * s}; }
-static inline float lx_rgb_max(lx_rgb a) { return fmaxf(a.r, fmaxf(a.g, a.b)); }
+static inline float lx_rgb_max(lx_rgb a) { return lx_max(a.r, lx_max(a.g, a.b)); }
 static inline bool lx_rgb_is_black(lx_rgb a) { return a.r == 0 && a.g == 0 && a.b == 0; }
 /// Rec. 709 luminance.
 static inline float lx_luminance(lx_rgb a) { return 0.2126f * a.r + 0.7152f * a.g + 0.0722f * a.b; }

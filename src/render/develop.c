@@ -5,7 +5,7 @@
 lx_rgb lx_tonemap_pbr_neutral(lx_rgb color)
 {
     static const float start_compression = 0.8f - 0.04f, desaturation = 0.15f;
-    const float x = fminf(color.r, fminf(color.g, color.b));
+    const float x = lx_min(color.r, lx_min(color.g, color.b));
     const float offset = x < 0.08f ? x - 6.25f * x * x : 0.04f;
     color = (lx_rgb){color.r - offset, color.g - offset, color.b - offset};
     const float peak = lx_rgb_max(color);

@@ -9,7 +9,7 @@
 
 lx_render_desc lx_render_desc_default(void)
 {
-    return (lx_render_desc){.width = 1280, .height = 720, .samples = 16, .auto_exposure = true,
+    return (lx_render_desc){.width = 1280, .height = 720, .yfov_deg = 60, .samples = 16, .auto_exposure = true,
                             .tonemap = LX_TONEMAP_PBR_NEUTRAL, .view = LX_VIEW_LIT, .transport = lx_transport_desc_default()};
 }
 
@@ -20,6 +20,9 @@ static lx_result check_desc(const lx_render_desc *desc, lx_error *error)
                        desc->width, desc->height);
     if (desc->samples < 1 || desc->samples > 1u << 20)
         return lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "samples must be 1 to %u, not %u", 1u << 20, desc->samples);
+    if (desc->look && !(desc->yfov_deg > 0 && desc->yfov_deg < 180))
+        return lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "a field of view of %g degrees is not possible",
+                       (double)desc->yfov_deg);
     return LX_OK;
 }
 

@@ -5,19 +5,32 @@
 #include <stdlib.h>
 #include <string.h>
 
+// A camera at `eye` whose -Z points along -back; +Y up, or -Z up when looking straight down or up.
+static lx_camera camera_at(lx_vec3 eye, lx_vec3 back, float yfov)
+{
+    const lx_vec3 up_hint = fabsf(back.y) > 0.9999f ? (lx_vec3){0, 0, -1} : (lx_vec3){0, 1, 0};
+    const lx_vec3 right = lx_normalize(lx_cross(up_hint, back)), up = lx_cross(back, right);
+    return (lx_camera){.name = "", .perspective = true, .yfov = yfov,
+                       .transform = {{right.x, right.y, right.z, 0, up.x, up.y, up.z, 0, back.x, back.y, back.z, 0, eye.x,
+                                      eye.y, eye.z, 1}}};
+}
+
 static lx_camera framing_camera(const lx_scene *scene, float aspect)
 {
     const lx_vec3 centre = lx_scale(lx_add(scene->bounds.low, scene->bounds.high), 0.5f);
-    const float radius = fmaxf(0.5f * lx_distance(scene->bounds.low, scene->bounds.high), 1e-6f);
+    const float radius = lx_max(0.5f * lx_distance(scene->bounds.low, scene->bounds.high), 1e-6f);
     const lx_vec3 back = lx_normalize((lx_vec3){0.55f, 0.45f, 1});
     const float yfov = 40 * LX_PI / 180;
     // The sphere around the scene just fits the narrower side.
     const float half = aspect < 1 ? atanf(tanf(yfov / 2) * aspect) : yfov / 2;
-    const lx_vec3 eye = lx_mad(centre, back, radius / sinf(half));
-    const lx_vec3 right = lx_normalize(lx_cross((lx_vec3){0, 1, 0}, back)), up = lx_cross(back, right);
-    return (lx_camera){.name = "", .perspective = true, .yfov = yfov,
-                       .transform = {{right.x, right.y, right.z, 0, up.x, up.y, up.z, 0, back.x, back.y, back.z, 0, eye.x,
-                                      eye.y, eye.z, 1}}};
+    return camera_at(lx_mad(centre, back, radius / sinf(half)), back, yfov);
+}
+
+static lx_camera looking_camera(const lx_render_desc *desc)
+{
+    const lx_vec3 eye = {desc->eye[0], desc->eye[1], desc->eye[2]};
+    const lx_vec3 target = {desc->target[0], desc->target[1], desc->target[2]};
+    return camera_at(eye, lx_normalize(lx_sub(eye, target)), desc->yfov_deg * LX_PI / 180);
 }
 
 static lx_result fail_camera(const lx_scene *scene, const char *name, lx_error *error)
@@ -54,7 +67,9 @@ lx_result lx_view_choose(const lx_scene *scene, const lx_render_desc *desc, lx_v
 {
     const float aspect = (float)desc->width / (float)desc->height;
     lx_camera camera;
-    if (desc->camera) {
+    if (desc->look) {
+        camera = looking_camera(desc);
+    } else if (desc->camera) {
         const lx_result result = find_camera(scene, desc->camera, &camera, error);
         if (result != LX_OK) return result;
     } else {

@@ -66,7 +66,7 @@ static uint32_t choose_grid(const lx_tracer *tracer, uint32_t surface, uint32_t 
         const lx_vec2 d = lx_sub2(uvs[corner[(e + 1) % 3]], uvs[corner[e]]);
         const float du = (slot->m[0] * d.x + slot->m[1] * d.y) * (float)image->width;
         const float dv = (slot->m[3] * d.x + slot->m[4] * d.y) * (float)image->height;
-        longest = fmaxf(longest, sqrtf(du * du + dv * dv));
+        longest = lx_max(longest, sqrtf(du * du + dv * dv));
     }
     const float pieces = ceilf(longest * 0.5f);
     return pieces < 1 ? 1 : pieces < max_grid ? (uint32_t)pieces : (uint32_t)max_grid;

@@ -19,7 +19,7 @@ float lx_range_factor(float distance, float range)
 float lx_spot_factor(const lx_light *light, float cosine)
 {
     const float cos_inner = cosf(light->inner_angle), cos_outer = cosf(light->outer_angle);
-    const float scale = 1 / fmaxf(1e-4f, cos_inner - cos_outer);
+    const float scale = 1 / lx_max(1e-4f, cos_inner - cos_outer);
     const float attenuation = lx_clamp((cosine - cos_outer) * scale, 0, 1);
     return attenuation * attenuation;
 }
@@ -87,8 +87,8 @@ static bool sample_point(const lx_light *light, const lx_receiver *r, lx_vec2 u,
     const float radiance = 1 / (LX_PI * light->radius * light->radius);
     *irradiance = factor * radiance * cosine * 2 * LX_PI * one_minus_cos;
     // The near side of the sphere along the direction.
-    const float across2 = distance2 * fmaxf(0, 1 - local.z * local.z);
-    const float near = distance * local.z - sqrtf(fmaxf(0, light->radius * light->radius - across2));
+    const float across2 = distance2 * lx_max(0, 1 - local.z * local.z);
+    const float near = distance * local.z - sqrtf(lx_max(0, light->radius * light->radius - across2));
     *ray = ray_to_point(r, lx_mad(r->position, direction, near));
     return true;
 }

@@ -169,7 +169,7 @@ static bool make_vertex(const path *p, const flight *f, const lx_shading *s, uin
     lx_rgb throughput = lx_rgb_mul(f->throughput, s->albedo);
     float survival = 1;
     if (vertex + 1 >= roulette_from_bounce) {
-        survival = fminf(1, lx_rgb_max(throughput));
+        survival = lx_min(1, lx_rgb_max(throughput));
         if (!(lx_sobol_one(p->sample, dimension_key(p, vertex, dimension_roulette)) < survival)) return false;
     }
     if (!(lx_rgb_max(throughput) > 0)) return false;

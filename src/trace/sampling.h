@@ -27,7 +27,7 @@ static inline lx_vec2 lx_sample_disk(lx_vec2 u)
 static inline lx_vec3 lx_sample_cosine_hemisphere(lx_vec2 u)
 {
     const lx_vec2 d = lx_sample_disk(u);
-    return (lx_vec3){d.x, d.y, sqrtf(fmaxf(0.0f, 1 - d.x * d.x - d.y * d.y))};
+    return (lx_vec3){d.x, d.y, sqrtf(lx_max(0.0f, 1 - d.x * d.x - d.y * d.y))};
 }
 
 /// Uniform direction within a cone around +Z, given 1 - cos(half angle), which keeps its precision for narrow cones.
@@ -35,7 +35,7 @@ static inline lx_vec3 lx_sample_cosine_hemisphere(lx_vec2 u)
 static inline lx_vec3 lx_sample_cone(lx_vec2 u, float one_minus_cos)
 {
     const float height = u.x * one_minus_cos; // 1 - cos(theta)
-    const float sine = sqrtf(fmaxf(0.0f, height * (2 - height)));
+    const float sine = sqrtf(lx_max(0.0f, height * (2 - height)));
     const float phi = 2 * LX_PI * u.y;
     return (lx_vec3){sine * cosf(phi), sine * sinf(phi), 1 - height};
 }

@@ -371,8 +371,8 @@ static lx_shading shade(const lx_tracer *tracer, lx_vec3 direction, uint32_t sur
         const lx_vec4 mr = sample_slot(tracer, &p, &m->metallic_roughness_texture, false);
         const float metallic = lx_clamp(m->metallic * mr.z, 0, 1), roughness = lx_clamp(m->roughness * mr.y, 0, 1);
         const float scale = (1 - metallic) + metallic * roughness * roughness * 0.5f;
-        s.albedo = (lx_rgb){fminf(base.x * scale, largest_albedo), fminf(base.y * scale, largest_albedo),
-                            fminf(base.z * scale, largest_albedo)};
+        s.albedo = (lx_rgb){lx_min(base.x * scale, largest_albedo), lx_min(base.y * scale, largest_albedo),
+                            lx_min(base.z * scale, largest_albedo)};
     }
     s.emission = (lx_rgb){0, 0, 0};
     if (m->unlit)
