@@ -74,7 +74,7 @@ static const char *parse_axis(const char *text, char axis, bool *negative, uint3
 
 static lx_result parse_size(struct hdr_reader *reader, const char *line, lx_error *error)
 {
-    bool y_negative, x_negative;
+    bool y_negative = false, x_negative = false;
     if ((line[0] == '-' || line[0] == '+') && line[1] == 'X')
         return lx_fail(error, LX_ERROR_UNSUPPORTED, "HDR: pictures stored column by column are not supported");
     const char *rest = parse_axis(line, 'Y', &y_negative, &reader->height);
