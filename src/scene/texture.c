@@ -63,11 +63,10 @@ lx_vec4 lx_texture_sample(const lx_scene *scene, const lx_texture_slot *slot, lx
     const lx_image *image = image_of(scene, slot);
     if (!image) return white;
     const lx_texture *texture = &scene->textures[slot->texture];
-    float u = slot->m[0] * uv.x + slot->m[1] * uv.y + slot->m[2];
-    float v = slot->m[3] * uv.x + slot->m[4] * uv.y + slot->m[5];
-    if (!isfinite(u)) u = 0; // coordinates are finite, but a transform may make them overflow
-    if (!isfinite(v)) v = 0;
-    const float x = u * (float)image->width, y = v * (float)image->height;
+    float x = (slot->m[0] * uv.x + slot->m[1] * uv.y + slot->m[2]) * (float)image->width;
+    float y = (slot->m[3] * uv.x + slot->m[4] * uv.y + slot->m[5]) * (float)image->height;
+    if (!isfinite(x)) x = 0; // coordinates are finite in a scene, but interpolated and transformed ones may overflow
+    if (!isfinite(y)) y = 0;
     if (texture->nearest)
         return fetch(image, wrap_texel(floorf(x), image->width, texture->wrap_s),
                      wrap_texel(floorf(y), image->height, texture->wrap_t), srgb);
