@@ -158,7 +158,7 @@ def make_materials(b):
     m("leaf", (0.9, 1.0, 0.8), "leaf", alpha="MASK", cutoff=0.5, double_sided=True)
     m("slat", (0.9, 0.88, 0.82), "slat", alpha="MASK", cutoff=0.5, double_sided=True)
     m("pane", (0.95, 0.98, 1.0), roughness=0.0, transmission=0.96)
-    m("clear glass", (0.93, 0.97, 0.96), roughness=0.05, transmission=0.86)
+    m("clear glass", (0.93, 0.97, 0.96), roughness=0.05, transmission=0.93)
     for name, color in (
         ("green", (0.16, 0.62, 0.24)),
         ("amber", (0.92, 0.42, 0.06)),
