@@ -43,11 +43,12 @@ static lx_vec3 ray_origin(const lx_receiver *r)
     return lx_offset_origin(r->position, r->geometric_normal);
 }
 
-// From the receiver to a point in space.
+// From the receiver to a point in space. It ends a little short: what carries the lamp (the emitter itself, or the ceiling that a lamp
+// lies flush with) must not shadow it, and the error of a hit's distance grows with the distance.
 static lx_ray ray_to_point(const lx_receiver *r, lx_vec3 target)
 {
     const lx_vec3 origin = ray_origin(r);
-    return (lx_ray){.origin = origin, .t_min = 0, .direction = lx_sub(target, origin), .t_max = 1};
+    return (lx_ray){.origin = origin, .t_min = 0, .direction = lx_sub(target, origin), .t_max = 1 - 0x1p-18f};
 }
 
 static lx_ray ray_to_infinity(const lx_receiver *r, lx_vec3 direction)
