@@ -19,7 +19,7 @@ float lx_range_factor(float distance, float range)
 float lx_spot_factor(const lx_light *light, float cosine)
 {
     const float cos_inner = cosf(light->inner_angle), cos_outer = cosf(light->outer_angle);
-    const float scale = 1 / lx_max(1e-4f, cos_inner - cos_outer);
+    const float scale = 1 / lx_max(1e-3f, cos_inner - cos_outer); // the extension's own least width
     const float attenuation = lx_clamp((cosine - cos_outer) * scale, 0, 1);
     return attenuation * attenuation;
 }
