@@ -78,8 +78,10 @@ static int64_t write_stream(exr_const_context_t context, void *user, const void 
 static lx_result fail_exr(exr_result_t code, const struct exr_stream *stream, lx_error *error)
 {
     if (code == EXR_ERR_OUT_OF_MEMORY) return lx_fail_memory(error, "EXR");
-    const lx_result result = code == EXR_ERR_FEATURE_NOT_IMPLEMENTED ? LX_ERROR_UNSUPPORTED : LX_ERROR_FORMAT;
-    return lx_fail(error, result, "EXR: %s", stream->message[0] ? stream->message : exr_get_default_error_message(code));
+    if (code == EXR_ERR_FEATURE_NOT_IMPLEMENTED) // DWA in OpenEXRCore 3.1
+        return lx_fail(error, LX_ERROR_UNSUPPORTED, "EXR: unsupported compression; save the picture with ZIP");
+    const char *message = stream->message[0] ? stream->message : exr_get_default_error_message(code);
+    return lx_fail(error, LX_ERROR_FORMAT, "EXR: %s", message);
 }
 
 // Calls the library; on failure jumps to `cleanup`. Needs the locals result, stream and error.
@@ -274,7 +276,7 @@ static lx_result check_compression(const struct exr_reader *reader, const struct
     exr_compression_t compression;
     EXR_TRY(exr_get_compression(reader->context, 0, &compression));
     if (compression == EXR_COMPRESSION_B44 || compression == EXR_COMPRESSION_B44A)
-        return lx_fail(error, LX_ERROR_UNSUPPORTED, "EXR: B44 compression is not supported");
+        return lx_fail(error, LX_ERROR_UNSUPPORTED, "EXR: unsupported compression; save the picture with ZIP");
 cleanup:
     return result;
 }

@@ -40,11 +40,13 @@ typedef enum lx_image_format {
 /// By the first bytes, never by the file's name.
 lx_image_format lx_image_sniff(const void *data, size_t size);
 
-/// Decodes PNG, JPEG, WebP (→ U8), EXR, HDR (→ F32) from memory. Hostile input gives an error, never a crash; sizes are checked
-/// against LX_IMAGE_MAX_PIXELS before anything is allocated.
-/// 16-bit PNG is reduced to 8 bits; palette and grey-with-tRNS expand; JPEG is grey or RGB (CMYK/YCCK is converted).
-/// EXR: scanline or tiled single-part images with channels R G B (A) or Y, half or float, any compression OpenEXRCore reads;
-/// the data window decides the size.
+/// Decodes PNG, JPEG, WebP (→ U8), EXR, HDR (→ F32) from memory. Hostile input gives an error, never a crash; sizes are
+/// checked against LX_IMAGE_MAX_PIXELS before anything is allocated. Messages are one line without the path.
+/// PNG: 16 bits are rounded to 8; palettes, 1-4 bits and transparent colours expand. JPEG: grey or RGB (CMYK and YCCK are
+/// converted). WebP: stills, RGB or RGBA. Alpha is as stored.
+/// EXR: scanline or tiled single-part images, half or float, with channels R G B (A), a missing one of the three being 0,
+/// or Y (A); other channels are ignored; compression none, RLE, ZIP, PIZ or PXR24; the data window decides the size.
+/// HDR: RGBE stored row by row; EXPOSURE is divided out.
 lx_result lx_image_decode(const void *data, size_t size, lx_image *out, lx_error *error);
 /// The same with a lower limit on width × height.
 lx_result lx_image_decode_limited(const void *data, size_t size, uint64_t max_pixels, lx_image *out, lx_error *error);
@@ -52,10 +54,10 @@ lx_result lx_image_decode_limited(const void *data, size_t size, uint64_t max_pi
 /// Reads and decodes a file of at most 1 GiB. Messages do not repeat the path.
 lx_result lx_image_load(const char *path, lx_image *out, lx_error *error);
 
-/// Encoders; `out` is owned by the caller.
+/// Encoders; `out` is owned by the caller. EXR channels are named Y, Y A, R G B or R G B A.
 lx_result lx_png_encode(const lx_image *image, lx_bytes *out, lx_error *error);                 ///< U8 only.
-lx_result lx_hdr_encode(const lx_image *image, lx_bytes *out, lx_error *error);                 ///< F32, 3 channels; run-length coded RGBE.
-lx_result lx_exr_encode(const lx_image *image, bool half_float, lx_bytes *out, lx_error *error); ///< F32; ZIP. Channels named R G B A or Y.
+lx_result lx_hdr_encode(const lx_image *image, lx_bytes *out, lx_error *error);                 ///< F32, 3 channels; RLE.
+lx_result lx_exr_encode(const lx_image *image, bool half_float, lx_bytes *out, lx_error *error); ///< F32; ZIP.
 
 /// Format by the ending of `path` (png: values are clamped 0…1 and stored sRGB; hdr; exr: 32-bit float), written atomically.
 lx_result lx_image_save(const lx_image *image, const char *path, lx_error *error);
