@@ -18,7 +18,7 @@ typedef struct render_options {
     cli_session session;
     cli_transport transport;
     lx_render_desc render;
-    const char *input, *output, *size, *exposure;
+    const char *input, *output, *size, *exposure, *eye, *target;
     cli_texts assignments;
     int tonemap, view, light_units;
     uint32_t samples; // 0: the library's default
@@ -39,6 +39,31 @@ static bool parse_size(const char *text, uint32_t *width, uint32_t *height)
     return true;
 }
 
+// "1,2.5,-3"
+static bool parse_point(const char *text, float point[3])
+{
+    for (int i = 0; i < 3; ++i) {
+        char *end = NULL;
+        point[i] = strtof(text, &end);
+        if (end == text || *end != (i < 2 ? ',' : '\0') || !isfinite(point[i])) return false;
+        text = end + 1;
+    }
+    return true;
+}
+
+static int parse_look(const cli_command *command, render_options *o)
+{
+    if (!o->eye && !o->target) return CLI_GO_ON;
+    if (!o->eye || !o->target) return cli_usage_error(command, "--eye and --target go together");
+    if (o->render.camera) return cli_usage_error(command, "--camera and --eye exclude each other");
+    if (!parse_point(o->eye, o->render.eye)) return cli_usage_error(command, "--eye: '%s' is not X,Y,Z", o->eye);
+    if (!parse_point(o->target, o->render.target)) return cli_usage_error(command, "--target: '%s' is not X,Y,Z", o->target);
+    if (memcmp(o->render.eye, o->render.target, sizeof o->render.eye) == 0)
+        return cli_usage_error(command, "--eye and --target are the same place");
+    o->render.look = true;
+    return CLI_GO_ON;
+}
+
 static int parse(const cli_command *command, int argc, char **argv, render_options *o)
 {
     const cli_option options[] = {
@@ -47,6 +72,11 @@ static int parse(const cli_command *command, int argc, char **argv, render_optio
          .help = ".png: developed with exposure and tone mapping; .exr, .hdr: linear radiance in nit"},
         {.name = "camera", .argument = "NAME|INDEX", .kind = CLI_TEXT, .target = &o->render.camera,
          .help = "default: the first in the file, else one that frames the scene"},
+        {.name = "eye", .argument = "X,Y,Z", .kind = CLI_TEXT, .target = &o->eye,
+         .help = "instead of a camera: look from here, in metres ..."},
+        {.name = "target", .argument = "X,Y,Z", .kind = CLI_TEXT, .target = &o->target, .help = "... to here"},
+        {.name = "fov", .argument = "DEG", .kind = CLI_FLOAT, .target = &o->render.yfov_deg, .min = 1, .max = 170,
+         .help = "... over this height of view (default 60)"},
         {.name = "size", .argument = "WxH", .kind = CLI_TEXT, .target = &o->size, .help = "default 1280x720"},
         {.name = "exposure", .argument = "EV|auto", .kind = CLI_TEXT, .target = &o->exposure,
          .help = "pixel = sRGB(tone(2^EV x radiance)); auto (default): from the mean brightness"},
@@ -85,6 +115,8 @@ static int parse(const cli_command *command, int argc, char **argv, render_optio
         if (end == o->exposure || *end || !(fabsf(o->render.exposure_ev) <= 100.0f))
             return cli_usage_error(command, "--exposure: '%s' is neither a number of stops nor auto", o->exposure);
     }
+    const int look = parse_look(command, o);
+    if (look != CLI_GO_ON) return look;
     o->render.tonemap = o->tonemap == 1 ? LX_TONEMAP_NONE : LX_TONEMAP_PBR_NEUTRAL;
     o->render.view = (lx_view)o->view;
     if (o->samples) o->render.samples = o->samples;
