@@ -1,7 +1,7 @@
 // The same texels in three formats, each read by somebody else's code: EXR and Radiance HDR by three.js, KTX2 by ktx-parse
 // and zstddec.
 import assert from "node:assert/strict";
-import { execFileSync } from "node:child_process";
+import { execFileSync, spawnSync } from "node:child_process";
 import test from "node:test";
 import { read } from "ktx-parse";
 import { bakedFile, bakedPath, decodeRgb9e5, filesOf, manifest, needsBaked } from "./baked.mjs";
@@ -89,11 +89,20 @@ test("exr and ktx2 hold the same texels, layer by layer", needsBaked, async () =
   }
 });
 
+// What exrinfo says in strict mode. Its exit code is of no use: that of OpenEXR 3.1.5 is a random number for good files too.
+function exrinfo(path) {
+  const { stdout, stderr, error, signal } = spawnSync("exrinfo", ["-s", path], { encoding: "utf8" });
+  assert.ifError(error);
+  assert.equal(signal, null);
+  assert.equal(stderr, "");
+  return stdout;
+}
+
 test("openexr's own tools read the pages", needsBaked, () => {
   const { atlas } = manifest();
   for (const { page, file } of filesOf("exr")) {
     const edge = atlas.pages[page].width;
-    const info = execFileSync("exrinfo", ["-s", bakedPath(file)], { encoding: "utf8" }); // strict
+    const info = exrinfo(bakedPath(file));
     assert.match(info, /compression: 'zip'/, file);
     const header = execFileSync("exrheader", [bakedPath(file)], { encoding: "utf8" });
     assert.match(header, new RegExp(`dataWindow.*\\(0 0\\) - \\(${edge - 1} ${edge - 1}\\)`), file);
