@@ -27,7 +27,7 @@ typedef struct crossing {
     lx_rgb transmittance;
     uint32_t count;
     bool overflow; // more surfaces than the list holds: the ray is walked again, one closest hit at a time
-    struct { uint32_t mesh, triangle; } seen[remembered_triangles];
+    struct { uint32_t mesh, triangle; float edge_t; } seen[remembered_triangles]; // edge_t: -1 away from edges
 } crossing;
 
 typedef struct ray_context {
@@ -57,6 +57,11 @@ static float hit_v(const struct RTCFilterFunctionNArguments *a, unsigned i)
     return ((const float *)a->hit)[4 * a->N + i];
 }
 
+static float hit_t(const struct RTCFilterFunctionNArguments *a, unsigned i)
+{
+    return ((const float *)a->ray)[8 * a->N + i];
+}
+
 static unsigned ray_id(const struct RTCFilterFunctionNArguments *a, unsigned i)
 {
     return ((const unsigned *)a->ray)[10 * a->N + i];
@@ -75,11 +80,16 @@ static void filter_closest(const struct RTCFilterFunctionNArguments *arguments)
     }
 }
 
-// Returns true if the crossed triangle lets some light pass, and accounts for it.
-static bool cross(const lx_accel *accel, crossing *state, unsigned mesh, unsigned triangle, float u, float v)
+// Returns true if the crossed triangle lets some light pass, and accounts for it. A ray through the edge that two triangles share hits
+// both: within one mesh, hits on edges at the same distance are one crossing.
+static bool cross(const lx_accel *accel, crossing *state, unsigned mesh, unsigned triangle, float u, float v, float t)
 {
-    for (uint32_t k = 0; k < state->count; ++k)
-        if (state->seen[k].mesh == mesh && state->seen[k].triangle == triangle) return true;
+    const bool on_edge = lx_min(lx_min(u, v), 1 - u - v) < 0x1p-16f;
+    for (uint32_t k = 0; k < state->count; ++k) {
+        if (state->seen[k].mesh != mesh) continue;
+        if (state->seen[k].triangle == triangle) return true;
+        if (on_edge && state->seen[k].edge_t >= 0 && fabsf(state->seen[k].edge_t - t) <= 0x1p-20f * t) return true;
+    }
     const lx_rgb passed = accel->queries.transmittance(accel->queries.user, mesh, triangle, u, v);
     if (lx_rgb_is_black(passed)) return false;
     if (state->count == remembered_triangles) {
@@ -88,6 +98,7 @@ static bool cross(const lx_accel *accel, crossing *state, unsigned mesh, unsigne
     }
     state->seen[state->count].mesh = mesh;
     state->seen[state->count].triangle = triangle;
+    state->seen[state->count].edge_t = on_edge ? t : -1;
     ++state->count;
     state->transmittance = lx_rgb_mul(state->transmittance, passed);
     return true;
@@ -99,7 +110,7 @@ static void filter_occluded(const struct RTCFilterFunctionNArguments *arguments)
     for (unsigned i = 0; i < arguments->N; ++i) {
         if (arguments->valid[i] != -1) continue;
         if (cross(context->accel, &context->crossings[ray_id(arguments, i)], hit_mesh(arguments, i),
-                  hit_triangle(arguments, i), hit_u(arguments, i), hit_v(arguments, i)))
+                  hit_triangle(arguments, i), hit_u(arguments, i), hit_v(arguments, i), hit_t(arguments, i)))
             arguments->valid[i] = 0;
     }
 }
