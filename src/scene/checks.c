@@ -60,11 +60,16 @@ static double power_of_light(const lx_scene *scene, const lx_light *light)
     const double radius = length_of_extent(scene) / 2;
     const double axes = (double)lx_length(lx_cross(light->axis_x, light->axis_y));
     switch (light->kind) {
-    case LX_LIGHT_POINT: return 4 * pi * strength;
-    case LX_LIGHT_SPOT: return 2 * pi * (1 - cos((double)light->outer_angle)) * strength;
-    case LX_LIGHT_DIRECTIONAL: return pi * radius * radius * strength;
-    case LX_LIGHT_RECT: return pi * 4 * axes * strength;
-    case LX_LIGHT_DISK: return pi * pi * axes * strength;
+    case LX_LIGHT_POINT:
+        return 4 * pi * strength;
+    case LX_LIGHT_SPOT:
+        return 2 * pi * (1 - cos((double)light->outer_angle)) * strength;
+    case LX_LIGHT_DIRECTIONAL:
+        return pi * radius * radius * strength;
+    case LX_LIGHT_RECT:
+        return pi * 4 * axes * strength;
+    case LX_LIGHT_DISK:
+        return pi * pi * axes * strength;
     }
     return 0;
 }
@@ -76,8 +81,10 @@ static void advise_on_emitters(const lx_scene *scene, lx_light_units units)
     for (uint32_t i = 0; i < scene->light_count; ++i) lamps += power_of_light(scene, &scene->lights[i]);
     const double emitters = lamps > 0 ? power_of_emitters(scene) : 0;
     if (!(emitters > 0) || emitters >= 0.01 * lamps) return;
-    lx_log_warning(scene->context->log, "scene: emissive materials give %.2g %% as much light as the lamps%s", 100 * emitters / lamps,
-                   units == LX_LIGHT_UNITS_GLTF ? "; Blender's exporter scales lamps only: see --light-units blender" : "");
+    lx_log_warning(scene->context->log, "scene: emissive materials give %.2g %% as much light as the lamps%s",
+                   100 * emitters / lamps,
+                   units == LX_LIGHT_UNITS_GLTF ? "; Blender's exporter scales lamps only: see --light-units blender"
+                                                : "");
 }
 
 static void advise_on_lights(const lx_scene *scene)
@@ -90,11 +97,13 @@ static void advise_blender_user(const lx_scene *scene, bool file_has_lights, boo
 {
     if (!scene->from_blender) return;
     if (!file_has_lights && scene->light_count == 0)
-        lx_log_note(scene->context->log, "exported by Blender without lights: if there are lamps in the scene, tick Punctual Lights "
-                                         "in the export dialog (Include > Data, or Data > Lighting); it is off by default");
+        lx_log_note(scene->context->log,
+                    "exported by Blender without lights: if there are lamps in the scene, tick Punctual Lights "
+                    "in the export dialog (Include > Data, or Data > Lighting); it is off by default");
     if (!has_luxel_keys)
-        lx_log_note(scene->context->log, "exported by Blender without luxel_ properties: if objects have any, tick Custom Properties "
-                                         "in the export dialog (Include); it is off by default");
+        lx_log_note(scene->context->log,
+                    "exported by Blender without luxel_ properties: if objects have any, tick Custom Properties "
+                    "in the export dialog (Include); it is off by default");
 }
 
 void lx_scene_advise(const lx_scene *scene, lx_light_units units, bool file_has_lights, bool has_luxel_keys)

@@ -7,7 +7,8 @@ uint32_t lx_triangle_count(lx_topology topology, uint32_t index_count)
     return index_count < 3 ? 0 : index_count - 2;
 }
 
-// glTF 2.0, section 3.7.2.1: the strip's triangle i is (i, i + 1 + i mod 2, i + 2 - i mod 2), the fan's (i + 1, i + 2, 0).
+// glTF 2.0, section 3.7.2.1: the strip's triangle i is (i, i + 1 + i mod 2, i + 2 - i mod 2), the fan's (i + 1, i + 2,
+// 0).
 void lx_triangulate(lx_topology topology, const uint32_t *indices, uint32_t index_count, uint32_t *out)
 {
     const uint32_t count = lx_triangle_count(topology, index_count);
@@ -32,20 +33,14 @@ typedef struct vec3d {
     double x, y, z;
 } vec3d;
 
-static vec3d subtract(lx_vec3 a, lx_vec3 b)
-{
-    return (vec3d){(double)a.x - b.x, (double)a.y - b.y, (double)a.z - b.z};
-}
+static vec3d subtract(lx_vec3 a, lx_vec3 b) { return (vec3d){(double)a.x - b.x, (double)a.y - b.y, (double)a.z - b.z}; }
 
 static vec3d cross(vec3d a, vec3d b)
 {
     return (vec3d){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-static double dot(vec3d a, vec3d b)
-{
-    return a.x * b.x + a.y * b.y + a.z * b.z;
-}
+static double dot(vec3d a, vec3d b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
 // Twice the area along the face normal. In double: the squares of micrometres and of thousand kilometres both fit.
 static vec3d face_vector(const lx_primitive *p, uint32_t triangle)
@@ -89,7 +84,8 @@ uint32_t lx_count_degenerate_triangles(const lx_primitive *p)
     for (uint32_t t = 0; t < p->triangle_count; ++t) {
         const uint32_t *v = &p->indices[3 * (size_t)t];
         const vec3d face = face_vector(p, t);
-        const vec3d ab = subtract(p->positions[v[1]], p->positions[v[0]]), ac = subtract(p->positions[v[2]], p->positions[v[0]]);
+        const vec3d ab = subtract(p->positions[v[1]], p->positions[v[0]]),
+                    ac = subtract(p->positions[v[2]], p->positions[v[0]]);
         // Sine of the angle at the first corner below 1e-9: far below what float positions resolve.
         count += dot(face, face) <= 1e-18 * dot(ab, ab) * dot(ac, ac);
     }

@@ -12,12 +12,16 @@ static uint32_t size_of_type(uint64_t component_type)
 {
     switch (component_type) {
     case type_i8:
-    case type_u8: return 1;
+    case type_u8:
+        return 1;
     case type_i16:
-    case type_u16: return 2;
+    case type_u16:
+        return 2;
     case type_u32:
-    case type_f32: return 4;
-    default: return 0;
+    case type_f32:
+        return 4;
+    default:
+        return 0;
     }
 }
 
@@ -26,7 +30,8 @@ static lx_result read_type(const lx_gltf_object *object, lx_gltf_accessor *out, 
     static const struct {
         const char *name;
         uint32_t components, columns;
-    } types[] = {{"SCALAR", 1, 1}, {"VEC2", 2, 1}, {"VEC3", 3, 1}, {"VEC4", 4, 1}, {"MAT2", 4, 2}, {"MAT3", 9, 3}, {"MAT4", 16, 4}};
+    } types[] = {{"SCALAR", 1, 1}, {"VEC2", 2, 1}, {"VEC3", 3, 1}, {"VEC4", 4, 1},
+                 {"MAT2", 4, 2},   {"MAT3", 9, 3}, {"MAT4", 16, 4}};
     lx_result result = LX_OK;
     const char *type = NULL;
     uint64_t component_type = 0;
@@ -62,8 +67,8 @@ static bool fits(const lx_gltf_view *view, size_t offset, uint32_t count, size_t
 
 static lx_result out_of_view(const lx_gltf_object *object, uint32_t count, int32_t view, size_t size, lx_error *error)
 {
-    return lx_fail(error, LX_ERROR_FORMAT, "%s: %u elements do not fit into bufferView %d (%zu bytes)", object->label, count,
-                   view, size);
+    return lx_fail(error, LX_ERROR_FORMAT, "%s: %u elements do not fit into bufferView %d (%zu bytes)", object->label,
+                   count, view, size);
 }
 
 static lx_result read_sparse(const lx_gltf_reader *reader, const lx_gltf_object *object, lx_gltf_accessor *out,
@@ -89,7 +94,8 @@ static lx_result read_sparse(const lx_gltf_reader *reader, const lx_gltf_object 
     if (index_view < 0 || value_view < 0)
         return lx_fail(error, LX_ERROR_FORMAT, "%s: no bufferView", index_view < 0 ? indices.label : values.label);
     if (type != type_u8 && type != type_u16 && type != type_u32)
-        return lx_fail(error, LX_ERROR_FORMAT, "%s: unknown componentType %llu", indices.label, (unsigned long long)type);
+        return lx_fail(error, LX_ERROR_FORMAT, "%s: unknown componentType %llu", indices.label,
+                       (unsigned long long)type);
     const size_t index_size = size_of_type(type);
     if (!fits(&reader->views[index_view], (size_t)index_offset, (uint32_t)count, index_size, index_size))
         return out_of_view(&indices, (uint32_t)count, index_view, reader->views[index_view].size, error);
@@ -123,8 +129,8 @@ lx_result lx_gltf_get_accessor(const lx_gltf_reader *reader, uint32_t index, lx_
         const lx_gltf_view *view = &reader->views[out->view];
         if (view->stride) out->stride = view->stride;
         if (out->stride < out->element_size)
-            return lx_fail(error, LX_ERROR_FORMAT, "%s: byteStride %zu is less than its elements' %zu bytes", object.label,
-                           out->stride, out->element_size);
+            return lx_fail(error, LX_ERROR_FORMAT, "%s: byteStride %zu is less than its elements' %zu bytes",
+                           object.label, out->stride, out->element_size);
         if (!fits(view, out->offset, out->count, out->stride, out->element_size))
             return out_of_view(&object, out->count, out->view, view->size, error);
     }
@@ -143,10 +149,7 @@ lx_result lx_gltf_check_accessors(lx_gltf_reader *reader, lx_error *error)
     return LX_OK;
 }
 
-static uint16_t load_u16(const uint8_t *bytes)
-{
-    return (uint16_t)(bytes[0] | bytes[1] << 8);
-}
+static uint16_t load_u16(const uint8_t *bytes) { return (uint16_t)(bytes[0] | bytes[1] << 8); }
 
 static uint32_t load_u32(const uint8_t *bytes)
 {
@@ -157,14 +160,18 @@ static uint32_t load_u32(const uint8_t *bytes)
 static float load_component(const uint8_t *bytes, uint32_t type, bool normalized)
 {
     switch (type) {
-    case type_i8: return normalized ? fmaxf((float)(int8_t)bytes[0] / 127.0f, -1.0f) : (float)(int8_t)bytes[0];
-    case type_u8: return normalized ? (float)bytes[0] / 255.0f : (float)bytes[0];
+    case type_i8:
+        return normalized ? fmaxf((float)(int8_t)bytes[0] / 127.0f, -1.0f) : (float)(int8_t)bytes[0];
+    case type_u8:
+        return normalized ? (float)bytes[0] / 255.0f : (float)bytes[0];
     case type_i16: {
         const float value = (float)(int16_t)load_u16(bytes);
         return normalized ? fmaxf(value / 32767.0f, -1.0f) : value;
     }
-    case type_u16: return normalized ? (float)load_u16(bytes) / 65535.0f : (float)load_u16(bytes);
-    case type_u32: return (float)load_u32(bytes);
+    case type_u16:
+        return normalized ? (float)load_u16(bytes) / 65535.0f : (float)load_u16(bytes);
+    case type_u32:
+        return (float)load_u32(bytes);
     default: {
         const uint32_t bits = load_u32(bytes);
         float value;
@@ -185,7 +192,8 @@ static lx_result visit_dense(lx_gltf_reader *reader, const lx_gltf_accessor *a, 
     if (a->view < 0 || a->count == 0) return LX_OK;
     const uint8_t *data;
     lx_result result = lx_gltf_view_data(reader, (uint32_t)a->view, &data, error);
-    for (uint32_t i = 0; result == LX_OK && i < a->count; ++i) result = func(user, a, i, data + a->offset + i * a->stride, error);
+    for (uint32_t i = 0; result == LX_OK && i < a->count; ++i)
+        result = func(user, a, i, data + a->offset + i * a->stride, error);
     return result;
 }
 
@@ -201,15 +209,15 @@ static lx_result visit_sparse(lx_gltf_reader *reader, const lx_gltf_accessor *a,
     for (uint32_t i = 0; result == LX_OK && i < s->count; ++i) {
         const uint32_t element = load_index(indices + s->index_offset + i * index_size, s->index_type);
         if (element >= a->count)
-            return lx_fail(error, LX_ERROR_FORMAT, "%s sparse: index %u out of range (count %u)", a->object.label, element,
-                           a->count);
+            return lx_fail(error, LX_ERROR_FORMAT, "%s sparse: index %u out of range (count %u)", a->object.label,
+                           element, a->count);
         result = func(user, a, element, values + s->value_offset + i * a->element_size, error);
     }
     return result;
 }
 
-lx_result lx_gltf_visit_elements(lx_gltf_reader *reader, const lx_gltf_accessor *a, lx_gltf_element_func func, void *user,
-                                 lx_error *error)
+lx_result lx_gltf_visit_elements(lx_gltf_reader *reader, const lx_gltf_accessor *a, lx_gltf_element_func func,
+                                 void *user, lx_error *error)
 {
     const lx_result result = visit_dense(reader, a, func, user, error);
     return result == LX_OK ? visit_sparse(reader, a, func, user, error) : result;
@@ -255,7 +263,8 @@ static lx_result store_index(void *user, const lx_gltf_accessor *a, uint32_t ele
     const index_target *target = user;
     const uint32_t index = load_index(bytes, a->component_type);
     if (index >= target->limit)
-        return lx_fail(error, LX_ERROR_FORMAT, "%s: index %u out of range (count %u)", a->object.label, index, target->limit);
+        return lx_fail(error, LX_ERROR_FORMAT, "%s: index %u out of range (count %u)", a->object.label, index,
+                       target->limit);
     target->indices[element] = index;
     return LX_OK;
 }

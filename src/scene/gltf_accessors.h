@@ -28,14 +28,15 @@ lx_result lx_gltf_check_accessors(lx_gltf_reader *reader, lx_error *error);
 
 lx_result lx_gltf_get_accessor(const lx_gltf_reader *reader, uint32_t index, lx_gltf_accessor *out, lx_error *error);
 
-/// Calls `func` with the bytes of each element, in order: dense ones first, then those that a sparse accessor puts in their place.
+/// Calls `func` with the bytes of each element, in order: dense ones first, then those that a sparse accessor puts in
+/// their place.
 typedef lx_result (*lx_gltf_element_func)(void *user, const lx_gltf_accessor *accessor, uint32_t element,
                                           const uint8_t *bytes, lx_error *error);
 lx_result lx_gltf_visit_elements(lx_gltf_reader *reader, const lx_gltf_accessor *accessor, lx_gltf_element_func func,
                                  void *user, lx_error *error);
 
-/// Its elements as floats, count × components of them, in a fresh array. Integers become 0…1 or -1…1 where the accessor is
-/// normalised, else their own value. NaN and infinity are refused.
+/// Its elements as floats, count × components of them, in a fresh array. Integers become 0…1 or -1…1 where the accessor
+/// is normalised, else their own value. NaN and infinity are refused.
 lx_result lx_gltf_read_floats(lx_gltf_reader *reader, const lx_gltf_accessor *accessor, float **out, lx_error *error);
 
 /// Its elements as vertex indices below `limit`, in a fresh array.

@@ -56,8 +56,8 @@ cleanup:
 }
 
 // byteOffset and byteLength of `object` within the buffer it names.
-static lx_result read_range(const lx_gltf_reader *reader, const lx_gltf_object *object, uint32_t *buffer, size_t *offset,
-                            size_t *size, lx_error *error)
+static lx_result read_range(const lx_gltf_reader *reader, const lx_gltf_object *object, uint32_t *buffer,
+                            size_t *offset, size_t *size, lx_error *error)
 {
     lx_result result = LX_OK;
     int32_t index;
@@ -91,7 +91,8 @@ static lx_result check_view(lx_gltf_reader *reader, uint32_t index, lx_error *er
     LX_TRY(read_range(reader, &object, &view->buffer, &view->offset, &view->size, error));
     LX_TRY(lx_gltf_get_size(&object, "byteStride", &stride, error));
     if (stride > 252) // glTF's own limit
-        return lx_fail(error, LX_ERROR_FORMAT, "%s: byteStride %llu is more than 252", object.label, (unsigned long long)stride);
+        return lx_fail(error, LX_ERROR_FORMAT, "%s: byteStride %llu is more than 252", object.label,
+                       (unsigned long long)stride);
     view->stride = (size_t)stride;
     const lx_gltf_object meshopt = meshopt_extension(&object);
     view->compressed = meshopt.json != NULL;
@@ -168,8 +169,8 @@ static lx_result apply_filter(const packing *p, const lx_gltf_object *object, ui
     else if (strcmp(p->filter, "EXPONENTIAL") == 0 && p->stride % 4 == 0)
         meshopt_decodeFilterExp(data, p->count, p->stride);
     else
-        return lx_fail(error, LX_ERROR_UNSUPPORTED, "%s: filter '%.20s' with byteStride %zu is not supported", object->label,
-                       p->filter, p->stride);
+        return lx_fail(error, LX_ERROR_UNSUPPORTED, "%s: filter '%.20s' with byteStride %zu is not supported",
+                       object->label, p->filter, p->stride);
     return LX_OK;
 }
 
@@ -186,7 +187,8 @@ static lx_result unpack(const packing *p, const lx_gltf_object *object, uint8_t 
         return lx_fail(error, LX_ERROR_FORMAT, "%s: mode '%.20s' with byteStride %zu and count %zu makes no sense",
                        object->label, p->mode, p->stride, p->count);
     if (status != 0)
-        return lx_fail(error, LX_ERROR_FORMAT, "%s: damaged, or of a newer version than this build reads", object->label);
+        return lx_fail(error, LX_ERROR_FORMAT, "%s: damaged, or of a newer version than this build reads",
+                       object->label);
     return strcmp(p->mode, "ATTRIBUTES") == 0 ? apply_filter(p, object, out, error) : LX_OK;
 }
 

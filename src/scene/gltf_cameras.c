@@ -29,7 +29,8 @@ cleanup:
     return result;
 }
 
-// A camera looks along -Z whatever the scale of its node; mirrored or sheared axes are made right-handed and square again.
+// A camera looks along -Z whatever the scale of its node; mirrored or sheared axes are made right-handed and square
+// again.
 static lx_mat4 without_scale(const lx_mat4 *m)
 {
     const lx_vec3 back = lx_normalize_or(lx_v3(m->m[8], m->m[9], m->m[10]), lx_v3(0, 0, 1));
@@ -38,8 +39,8 @@ static lx_mat4 without_scale(const lx_mat4 *m)
     lx_tangent_frame(back, &t, &b);
     const lx_vec3 right = lx_normalize_or(lx_cross(up, back), t);
     const lx_vec3 true_up = lx_cross(back, right);
-    return (lx_mat4){{right.x, right.y, right.z, 0, true_up.x, true_up.y, true_up.z, 0, back.x, back.y, back.z, 0, m->m[12],
-                      m->m[13], m->m[14], 1}};
+    return (lx_mat4){{right.x, right.y, right.z, 0, true_up.x, true_up.y, true_up.z, 0, back.x, back.y, back.z, 0,
+                      m->m[12], m->m[13], m->m[14], 1}};
 }
 
 static bool is_usable(const lx_camera *camera)
@@ -48,8 +49,8 @@ static bool is_usable(const lx_camera *camera)
     return camera->perspective ? camera->yfov > 0 && camera->yfov < LX_PI : camera->xmag > 0 && camera->ymag > 0;
 }
 
-static lx_result read_camera(lx_gltf_reader *reader, uint32_t node_index, const lx_gltf_object *node, uint32_t camera_index,
-                             lx_error *error)
+static lx_result read_camera(lx_gltf_reader *reader, uint32_t node_index, const lx_gltf_object *node,
+                             uint32_t camera_index, lx_error *error)
 {
     lx_result result = LX_OK;
     lx_scene *scene = reader->scene;
@@ -58,9 +59,12 @@ static lx_result read_camera(lx_gltf_reader *reader, uint32_t node_index, const 
     lx_camera camera = {.transform = without_scale(&reader->nodes[node_index].world)};
     LX_TRY(lx_gltf_element(reader, LX_GLTF_CAMERA, camera_index, &object, error));
     LX_TRY(lx_gltf_get_string(&object, "type", &type, error));
-    if (strcmp(type, "perspective") == 0) LX_TRY(read_perspective(&object, &camera, error));
-    else if (strcmp(type, "orthographic") == 0) LX_TRY(read_orthographic(&object, &camera, error));
-    else return lx_fail(error, LX_ERROR_FORMAT, "%s: unknown type '%.20s'", object.label, type);
+    if (strcmp(type, "perspective") == 0)
+        LX_TRY(read_perspective(&object, &camera, error));
+    else if (strcmp(type, "orthographic") == 0)
+        LX_TRY(read_orthographic(&object, &camera, error));
+    else
+        return lx_fail(error, LX_ERROR_FORMAT, "%s: unknown type '%.20s'", object.label, type);
     if (!is_usable(&camera)) {
         lx_log_warning(reader->log, "%s: its angles or extents make no picture; ignored", object.label);
         return LX_OK;

@@ -27,23 +27,17 @@ static json_t *number(float value)
     return json_real(isfinite(value) ? strtod(text, NULL) : 0);
 }
 
-static json_t *vector(lx_vec3 v)
-{
-    return json_pack("[o,o,o]", number(v.x), number(v.y), number(v.z));
-}
+static json_t *vector(lx_vec3 v) { return json_pack("[o,o,o]", number(v.x), number(v.y), number(v.z)); }
 
-static json_t *color(lx_rgb c)
-{
-    return json_pack("[o,o,o]", number(c.r), number(c.g), number(c.b));
-}
+static json_t *color(lx_rgb c) { return json_pack("[o,o,o]", number(c.r), number(c.g), number(c.b)); }
 
 static json_t *describe_counts(const lx_scene *scene)
 {
     uint32_t used_images = 0, dynamic = 0;
     for (uint32_t i = 0; i < scene->image_count; ++i) used_images += scene->images[i].width > 0;
     for (uint32_t i = 0; i < scene->instance_count; ++i) dynamic += !scene->instances[i].is_static;
-    return json_pack("{s:I,s:I,s:I,s:I,s:I,s:I,s:I,s:I,s:I,s:I}", "triangles", (json_int_t)scene->triangle_count, "instances",
-                     (json_int_t)scene->instance_count, "dynamic_instances", (json_int_t)dynamic, "meshes",
+    return json_pack("{s:I,s:I,s:I,s:I,s:I,s:I,s:I,s:I,s:I,s:I}", "triangles", (json_int_t)scene->triangle_count,
+                     "instances", (json_int_t)scene->instance_count, "dynamic_instances", (json_int_t)dynamic, "meshes",
                      (json_int_t)scene->mesh_count, "materials", (json_int_t)scene->material_count, "textures",
                      (json_int_t)scene->texture_count, "images", (json_int_t)used_images, "lights",
                      (json_int_t)scene->light_count, "sources", (json_int_t)scene->source_count, "cameras",
@@ -52,18 +46,19 @@ static json_t *describe_counts(const lx_scene *scene)
 
 static json_t *describe_source(const lx_source *source)
 {
-    return json_pack("{s:s,s:s,s:s,s:s,s:o,s:o,s:s,s:I,s:o}", "name", source->name, "kind", source_kinds[source->kind], "layer",
-                     source->layer ? source->layer : source->name, "mode", mode_names[source->mode], "color",
-                     color(source->color), "intensity", number(source->intensity), "unit", source_units[source->kind], "node",
-                     (json_int_t)source->node, "material", source->material >= 0 ? json_integer(source->material) : json_null());
+    return json_pack("{s:s,s:s,s:s,s:s,s:o,s:o,s:s,s:I,s:o}", "name", source->name, "kind", source_kinds[source->kind],
+                     "layer", source->layer ? source->layer : source->name, "mode", mode_names[source->mode], "color",
+                     color(source->color), "intensity", number(source->intensity), "unit", source_units[source->kind],
+                     "node", (json_int_t)source->node, "material",
+                     source->material >= 0 ? json_integer(source->material) : json_null());
 }
 
 static json_t *describe_light(const lx_light *light)
 {
-    json_t *json = json_pack("{s:s,s:s,s:I,s:o,s:o,s:o,s:o,s:s}", "name", light->name, "kind", source_kinds[light->kind], "node",
-                             (json_int_t)light->node, "position", vector(light->position), "direction", vector(light->direction),
-                             "color", color(light->color), "intensity", number(light->intensity), "unit",
-                             source_units[light->kind]);
+    json_t *json = json_pack(
+        "{s:s,s:s,s:I,s:o,s:o,s:o,s:o,s:s}", "name", light->name, "kind", source_kinds[light->kind], "node",
+        (json_int_t)light->node, "position", vector(light->position), "direction", vector(light->direction), "color",
+        color(light->color), "intensity", number(light->intensity), "unit", source_units[light->kind]);
     if (!json) return NULL;
     if (light->range > 0) json_object_set_new(json, "range", number(light->range));
     if (light->radius > 0) json_object_set_new(json, "radius", number(light->radius));
@@ -81,17 +76,19 @@ static json_t *describe_light(const lx_light *light)
 static json_t *describe_camera(const lx_camera *camera)
 {
     const float *m = camera->transform.m;
-    return json_pack("{s:s,s:s,s:o,s:o,s:o}", "name", camera->name, "kind", camera->perspective ? "perspective" : "orthographic",
-                     "position", vector(lx_v3(m[12], m[13], m[14])), "direction", vector(lx_v3(-m[8], -m[9], -m[10])),
+    return json_pack("{s:s,s:s,s:o,s:o,s:o}", "name", camera->name, "kind",
+                     camera->perspective ? "perspective" : "orthographic", "position",
+                     vector(lx_v3(m[12], m[13], m[14])), "direction", vector(lx_v3(-m[8], -m[9], -m[10])),
                      camera->perspective ? "yfov" : "ymag", number(camera->perspective ? camera->yfov : camera->ymag));
 }
 
 static json_t *describe_material(const lx_material *material)
 {
-    json_t *json = json_pack("{s:s,s:o,s:o,s:o,s:s,s:b,s:b,s:b}", "name", material->name, "base_color", color(material->base_color),
-                             "metallic", number(material->metallic), "roughness", number(material->roughness), "alpha_mode",
-                             alpha_names[material->alpha_mode], "double_sided", (int)material->double_sided, "unlit",
-                             (int)material->unlit, "emissive", (int)lx_material_emits(material));
+    json_t *json = json_pack("{s:s,s:o,s:o,s:o,s:s,s:b,s:b,s:b}", "name", material->name, "base_color",
+                             color(material->base_color), "metallic", number(material->metallic), "roughness",
+                             number(material->roughness), "alpha_mode", alpha_names[material->alpha_mode],
+                             "double_sided", (int)material->double_sided, "unlit", (int)material->unlit, "emissive",
+                             (int)lx_material_emits(material));
     if (!json) return NULL;
     if (lx_material_emits(material)) {
         json_object_set_new(json, "emissive_factor", color(material->emissive_factor));
@@ -129,8 +126,9 @@ lx_result lx_scene_describe(const lx_scene *scene, char **out_json, lx_error *er
     failed |= json_object_set_new(root, "from_blender", json_boolean(scene->from_blender)) != 0;
     failed |= json_object_set_new(root, "counts", describe_counts(scene)) != 0;
     if (scene->triangle_count > 0)
-        failed |= json_object_set_new(root, "bounds", json_pack("{s:o,s:o}", "min", vector(scene->bounds.low), "max",
-                                                                vector(scene->bounds.high))) != 0;
+        failed |= json_object_set_new(
+                      root, "bounds",
+                      json_pack("{s:o,s:o}", "min", vector(scene->bounds.low), "max", vector(scene->bounds.high))) != 0;
     DESCRIBE_ALL(root, "sources", scene->source_count, scene->sources, describe_source);
     DESCRIBE_ALL(root, "lights", scene->light_count, scene->lights, describe_light);
     DESCRIBE_ALL(root, "cameras", scene->camera_count, scene->cameras, describe_camera);

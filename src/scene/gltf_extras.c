@@ -1,5 +1,5 @@
-// Authoring keys (`luxel_…`) in the extras of nodes, lights and materials. In Blender they are custom properties, so numbers,
-// texts and check boxes come in whatever type a person happened to choose.
+// Authoring keys (`luxel_…`) in the extras of nodes, lights and materials. In Blender they are custom properties, so
+// numbers, texts and check boxes come in whatever type a person happened to choose.
 #include "scene/gltf_extras.h"
 
 #include "base/error.h"
@@ -69,8 +69,10 @@ static int8_t to_flag(const json_t *value)
 static lx_result read_flag(const key_site *site, const json_t *value, int8_t *flag)
 {
     const int8_t read = to_flag(value);
-    if (read < 0) warn(site, "true or false");
-    else *flag = read;
+    if (read < 0)
+        warn(site, "true or false");
+    else
+        *flag = read;
     return LX_OK;
 }
 
@@ -106,8 +108,10 @@ static lx_result read_density(const key_site *site, const json_t *value, lx_erro
 {
     (void)error;
     float number;
-    if (to_number(value, &number) && number > 0) site->out->density = number;
-    else warn(site, "a number above 0");
+    if (to_number(value, &number) && number > 0)
+        site->out->density = number;
+    else
+        warn(site, "a number above 0");
     return LX_OK;
 }
 
@@ -115,8 +119,10 @@ static lx_result read_radius(const key_site *site, const json_t *value, lx_error
 {
     (void)error;
     float number;
-    if (to_number(value, &number) && number >= 0) site->out->radius = number;
-    else warn(site, "a number of at least 0");
+    if (to_number(value, &number) && number >= 0)
+        site->out->radius = number;
+    else
+        warn(site, "a number of at least 0");
     return LX_OK;
 }
 
@@ -172,8 +178,8 @@ static bool to_color(const json_t *value, lx_rgb *out)
         return true;
     }
     return json_array_size(value) == 3 && to_number(json_array_get(value, 0), &out->r) &&
-           to_number(json_array_get(value, 1), &out->g) && to_number(json_array_get(value, 2), &out->b) && out->r >= 0 &&
-           out->g >= 0 && out->b >= 0;
+           to_number(json_array_get(value, 1), &out->g) && to_number(json_array_get(value, 2), &out->b) &&
+           out->r >= 0 && out->g >= 0 && out->b >= 0;
 }
 
 static lx_result read_color(const key_site *site, const json_t *value, lx_error *error)
@@ -189,7 +195,8 @@ enum { node = LX_EXTRAS_NODE, light = LX_EXTRAS_LIGHT, material = LX_EXTRAS_MATE
 static const struct {
     const char *key;
     int places;
-    lx_result (*read)(const key_site *site, const json_t *value, lx_error *error); ///< NULL: known, but not to the importer.
+    lx_result (*read)(const key_site *site, const json_t *value,
+                      lx_error *error); ///< NULL: known, but not to the importer.
 } keys[] = {
     {"luxel_layer", node | light | material, read_layer},
     {"luxel_mode", node | light | material, read_mode},
@@ -243,7 +250,8 @@ static const char *nearest_key(const char *key)
     return nearest;
 }
 
-static lx_result read_key(const key_site *site, const json_t *value, lx_extras_place place, uint32_t *count, lx_error *error)
+static lx_result read_key(const key_site *site, const json_t *value, lx_extras_place place, uint32_t *count,
+                          lx_error *error)
 {
     for (int i = 0; i < key_count; ++i) {
         if (strcmp(site->key, keys[i].key) != 0) continue;
@@ -253,7 +261,8 @@ static lx_result read_key(const key_site *site, const json_t *value, lx_extras_p
                        keys[i].places & material ? "a node or material" : "a node");
         return LX_OK;
     }
-    lx_log_warning(site->log, "%s: unknown key %.64s; did you mean %s?", site->object->label, site->key, nearest_key(site->key));
+    lx_log_warning(site->log, "%s: unknown key %.64s; did you mean %s?", site->object->label, site->key,
+                   nearest_key(site->key));
     return LX_OK;
 }
 

@@ -9,11 +9,11 @@ typedef enum lx_area_shape { LX_AREA_NONE, LX_AREA_RECT, LX_AREA_DISK } lx_area_
 
 /// The keys of one object. What is not set can be completed from an object that ranks lower.
 typedef struct lx_gltf_extras {
-    const char *layer; ///< In the scene's arena; NULL: not set.
-    int8_t mode;       ///< An lx_light_mode; -1: not set.
+    const char *layer;             ///< In the scene's arena; NULL: not set.
+    int8_t mode;                   ///< An lx_light_mode; -1: not set.
     int8_t is_static, transparent; ///< 0, 1; -1: not set.
-    float density;   ///< 0: not set.
-    float radius;    ///< As written: metres or degrees; -1: not set.
+    float density;                 ///< 0: not set.
+    float radius;                  ///< As written: metres or degrees; -1: not set.
     lx_area_shape area;
     float area_width, area_height; ///< RECT: edges; DISK: radius in both.
     bool has_color, has_intensity;
@@ -22,12 +22,17 @@ typedef struct lx_gltf_extras {
 } lx_gltf_extras;
 
 /// Where an object may stand; decides which keys make sense there.
-typedef enum lx_extras_place { LX_EXTRAS_NODE = 1, LX_EXTRAS_LIGHT = 2, LX_EXTRAS_MATERIAL = 4, LX_EXTRAS_ELSEWHERE = 8 } lx_extras_place;
+typedef enum lx_extras_place {
+    LX_EXTRAS_NODE = 1,
+    LX_EXTRAS_LIGHT = 2,
+    LX_EXTRAS_MATERIAL = 4,
+    LX_EXTRAS_ELSEWHERE = 8
+} lx_extras_place;
 
 lx_gltf_extras lx_gltf_extras_unset(void);
 
-/// Reads the luxel_ keys of object's extras. Unknown keys and values that make no sense get a warning. `key_count` is increased
-/// by the number of known keys met.
+/// Reads the luxel_ keys of object's extras. Unknown keys and values that make no sense get a warning. `key_count` is
+/// increased by the number of known keys met.
 lx_result lx_gltf_extras_read(lx_log *log, lx_arena *strings, const lx_gltf_object *object, lx_extras_place place,
                               lx_gltf_extras *out, uint32_t *key_count, lx_error *error);
 

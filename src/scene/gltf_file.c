@@ -11,7 +11,13 @@ static uint32_t read_u32(const uint8_t *bytes)
     return (uint32_t)bytes[0] | (uint32_t)bytes[1] << 8 | (uint32_t)bytes[2] << 16 | (uint32_t)bytes[3] << 24;
 }
 
-enum { glb_magic = 0x46546c67, chunk_json = 0x4e4f534a, chunk_bin = 0x004e4942, header_bytes = 12, chunk_header_bytes = 8 };
+enum {
+    glb_magic = 0x46546c67,
+    chunk_json = 0x4e4f534a,
+    chunk_bin = 0x004e4942,
+    header_bytes = 12,
+    chunk_header_bytes = 8
+};
 
 typedef struct glb_parts {
     const char *json;
@@ -25,8 +31,7 @@ static lx_result split_glb(lx_log *log, const uint8_t *data, size_t size, glb_pa
     if (size < header_bytes) return lx_fail(error, LX_ERROR_FORMAT, "GLB: truncated after %zu bytes", size);
     const uint32_t version = read_u32(data + 4), length = read_u32(data + 8);
     if (version != 2) return lx_fail(error, LX_ERROR_UNSUPPORTED, "GLB: version %u (only 2 is read)", version);
-    if (length > size)
-        return lx_fail(error, LX_ERROR_FORMAT, "GLB: truncated: %zu bytes of %u", size, length);
+    if (length > size) return lx_fail(error, LX_ERROR_FORMAT, "GLB: truncated: %zu bytes of %u", size, length);
     if (length < size) lx_log_warning(log, "GLB: %zu bytes behind its end are ignored", size - length);
     size_t at = header_bytes;
     for (uint32_t chunk = 0; at < length; ++chunk) {
@@ -73,17 +78,34 @@ cleanup:
 
 // Extensions whose meaning is taken in.
 static const char *const read_extensions[] = {
-    "EXT_mesh_gpu_instancing",     "EXT_meshopt_compression",   "EXT_texture_webp",
-    "KHR_animation_pointer",       "KHR_lights_punctual",       "KHR_materials_emissive_strength",
-    "KHR_materials_pbrSpecularGlossiness", "KHR_materials_transmission", "KHR_materials_unlit",
-    "KHR_mesh_quantization",       "KHR_meshopt_compression",   "KHR_texture_transform",
+    "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
+    "EXT_texture_webp",
+    "KHR_animation_pointer",
+    "KHR_lights_punctual",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
+    "KHR_texture_transform",
 };
 
 // Extensions that a file may even require: without them all geometry and light is still read rightly.
 static const char *const harmless_extensions[] = {
-    "KHR_materials_anisotropy", "KHR_materials_clearcoat", "KHR_materials_diffuse_transmission", "KHR_materials_dispersion",
-    "KHR_materials_ior",        "KHR_materials_iridescence", "KHR_materials_sheen", "KHR_materials_specular",
-    "KHR_materials_variants",   "KHR_materials_volume",    "KHR_xmp", "KHR_xmp_json_ld",
+    "KHR_materials_anisotropy",
+    "KHR_materials_clearcoat",
+    "KHR_materials_diffuse_transmission",
+    "KHR_materials_dispersion",
+    "KHR_materials_ior",
+    "KHR_materials_iridescence",
+    "KHR_materials_sheen",
+    "KHR_materials_specular",
+    "KHR_materials_variants",
+    "KHR_materials_volume",
+    "KHR_xmp",
+    "KHR_xmp_json_ld",
 };
 
 // Ways out of extensions that change how data is stored, with a tool that people have.
@@ -104,10 +126,7 @@ static bool is_among(const char *name, const char *const *names, size_t count)
 
 #define COUNT_OF(array) (sizeof(array) / sizeof *(array))
 
-const char *lx_gltf_draco_advice(void)
-{
-    return advices[0].advice;
-}
+const char *lx_gltf_draco_advice(void) { return advices[0].advice; }
 
 static const char *advice_for(const char *name)
 {
@@ -164,7 +183,8 @@ bool lx_gltf_uses_extension(const lx_gltf_reader *reader, const char *name)
 
 static void recognise_exporter(lx_gltf_reader *reader)
 {
-    const char *generator = json_string_value(json_object_get(json_object_get(reader->root.json, "asset"), "generator"));
+    const char *generator =
+        json_string_value(json_object_get(json_object_get(reader->root.json, "asset"), "generator"));
     // The second is what versions before 2.83 wrote.
     reader->scene->from_blender = generator && (strstr(generator, "Khronos glTF Blender I/O") != NULL ||
                                                 strstr(generator, "Khronos Blender glTF 2.0 I/O") != NULL);

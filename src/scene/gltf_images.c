@@ -12,7 +12,8 @@ static lx_wrap wrap_of(uint64_t mode)
     return mode == gl_clamp ? LX_WRAP_CLAMP : mode == gl_mirror ? LX_WRAP_MIRROR : LX_WRAP_REPEAT;
 }
 
-static lx_result read_sampler(const lx_gltf_reader *reader, const lx_gltf_object *texture, lx_texture *out, lx_error *error)
+static lx_result read_sampler(const lx_gltf_reader *reader, const lx_gltf_object *texture, lx_texture *out,
+                              lx_error *error)
 {
     lx_result result = LX_OK;
     int32_t index;
@@ -66,7 +67,8 @@ lx_result lx_gltf_load_textures(lx_gltf_reader *reader, lx_error *error)
 
 static void mark_slot(const lx_scene *scene, const lx_texture_slot *slot, bool *used)
 {
-    if (slot->texture >= 0 && scene->textures[slot->texture].image >= 0) used[scene->textures[slot->texture].image] = true;
+    if (slot->texture >= 0 && scene->textures[slot->texture].image >= 0)
+        used[scene->textures[slot->texture].image] = true;
 }
 
 static void mark_used(const lx_scene *scene, bool *used)
@@ -161,7 +163,8 @@ static lx_result decode_images(lx_gltf_reader *reader, encoded_image *images, ui
             result = lx_fail(error, images[i].result, "%s: %s", images[i].object.label, images[i].error.message);
             goto cleanup;
         }
-        LX_TRY(lx_gltf_charge(reader, (uint64_t)image->width * image->height, image->channels, images[i].object.label, error));
+        LX_TRY(lx_gltf_charge(reader, (uint64_t)image->width * image->height, image->channels, images[i].object.label,
+                              error));
     }
 cleanup:
     lx_free(wanted);

@@ -10,22 +10,29 @@
 
 #include <string.h>
 
-// What decoding may allocate: a basis that holds any honest texture, and so much per byte of input; and never more than so many
-// times the largest file that is allowed. A file of a few lines can ask for thousands of copies of one mesh, or for a mesh of
-// two thousand million zeros.
+// What decoding may allocate: a basis that holds any honest texture, and so much per byte of input; and never more than
+// so many times the largest file that is allowed. A file of a few lines can ask for thousands of copies of one mesh, or
+// for a mesh of two thousand million zeros.
 #define BASE_ALLOWANCE (2ull << 30)
 enum { allowance_per_byte = 64, allowance_per_limit_byte = 16 };
 
 static const struct {
     const char *array, *element;
 } kinds[lx_gltf_kind_count] = {
-    [LX_GLTF_BUFFER] = {"buffers", "buffer"},          [LX_GLTF_VIEW] = {"bufferViews", "bufferView"},
-    [LX_GLTF_ACCESSOR] = {"accessors", "accessor"},    [LX_GLTF_SAMPLER] = {"samplers", "sampler"},
-    [LX_GLTF_IMAGE] = {"images", "image"},             [LX_GLTF_TEXTURE] = {"textures", "texture"},
-    [LX_GLTF_MATERIAL] = {"materials", "material"},    [LX_GLTF_MESH] = {"meshes", "mesh"},
-    [LX_GLTF_SKIN] = {"skins", "skin"},                [LX_GLTF_CAMERA] = {"cameras", "camera"},
-    [LX_GLTF_LIGHT] = {"lights", "light"},             [LX_GLTF_ANIMATION] = {"animations", "animation"},
-    [LX_GLTF_NODE] = {"nodes", "node"},                [LX_GLTF_SCENE] = {"scenes", "scene"},
+    [LX_GLTF_BUFFER] = {"buffers", "buffer"},
+    [LX_GLTF_VIEW] = {"bufferViews", "bufferView"},
+    [LX_GLTF_ACCESSOR] = {"accessors", "accessor"},
+    [LX_GLTF_SAMPLER] = {"samplers", "sampler"},
+    [LX_GLTF_IMAGE] = {"images", "image"},
+    [LX_GLTF_TEXTURE] = {"textures", "texture"},
+    [LX_GLTF_MATERIAL] = {"materials", "material"},
+    [LX_GLTF_MESH] = {"meshes", "mesh"},
+    [LX_GLTF_SKIN] = {"skins", "skin"},
+    [LX_GLTF_CAMERA] = {"cameras", "camera"},
+    [LX_GLTF_LIGHT] = {"lights", "light"},
+    [LX_GLTF_ANIMATION] = {"animations", "animation"},
+    [LX_GLTF_NODE] = {"nodes", "node"},
+    [LX_GLTF_SCENE] = {"scenes", "scene"},
 };
 
 lx_result lx_gltf_element(const lx_gltf_reader *reader, lx_gltf_kind kind, uint32_t index, lx_gltf_object *out,
@@ -38,7 +45,8 @@ lx_result lx_gltf_element(const lx_gltf_reader *reader, lx_gltf_kind kind, uint3
 
 void lx_gltf_grant(lx_gltf_reader *reader, size_t input_bytes)
 {
-    uint64_t grant = input_bytes > UINT64_MAX / allowance_per_byte ? UINT64_MAX : (uint64_t)input_bytes * allowance_per_byte;
+    uint64_t grant =
+        input_bytes > UINT64_MAX / allowance_per_byte ? UINT64_MAX : (uint64_t)input_bytes * allowance_per_byte;
     if (grant > reader->memory_reserve) grant = reader->memory_reserve;
     reader->memory_reserve -= grant;
     reader->memory_left += grant;
@@ -47,8 +55,9 @@ void lx_gltf_grant(lx_gltf_reader *reader, size_t input_bytes)
 lx_result lx_gltf_charge(lx_gltf_reader *reader, uint64_t count, size_t size, const char *label, lx_error *error)
 {
     if (size != 0 && count > reader->memory_left / size)
-        return lx_fail(error, LX_ERROR_LIMIT, "%s: the scene would take more memory than is allowed (%llu times %zu bytes more)",
-                       label, (unsigned long long)count, size);
+        return lx_fail(error, LX_ERROR_LIMIT,
+                       "%s: the scene would take more memory than is allowed (%llu times %zu bytes more)", label,
+                       (unsigned long long)count, size);
     reader->memory_left -= count * size;
     return LX_OK;
 }

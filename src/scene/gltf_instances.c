@@ -1,5 +1,4 @@
 // Instances and surfaces: meshes at their places in the world.
-#include "scene/geometry.h"
 #include "scene/gltf_accessors.h"
 
 #include "base/error.h"
@@ -8,11 +7,13 @@
 #include <stdio.h>
 #include <string.h>
 
-#define MAX_TRIANGLES (1ull << 31)  // of all instances; indices of triangles stay below 2^31 everywhere
-#define MAX_MEASURED (100ull << 20) // triangles whose corners are all looked at; the boxes of later instances are looser
+#define MAX_TRIANGLES (1ull << 31) // of all instances; indices of triangles stay below 2^31 everywhere
+#define MAX_COORDINATE 1e15f       // metres: areas and volumes further out do not fit into floats
+#define MAX_MEASURED                                                                                                   \
+    (100ull << 20) // triangles whose corners are all looked at; the boxes of later instances are looser
 
-static lx_result add_surfaces(lx_gltf_reader *reader, lx_instance *instance, uint32_t instance_index, int8_t transparent,
-                              lx_error *error)
+static lx_result add_surfaces(lx_gltf_reader *reader, lx_instance *instance, uint32_t instance_index,
+                              int8_t transparent, lx_error *error)
 {
     lx_scene *scene = reader->scene;
     const lx_mesh *mesh = &scene->meshes[instance->mesh];
@@ -20,8 +21,8 @@ static lx_result add_surfaces(lx_gltf_reader *reader, lx_instance *instance, uin
         return lx_fail(error, LX_ERROR_LIMIT, "node %u: too many surfaces", instance->node);
     lx_result result = lx_gltf_charge(reader, mesh->primitive_count, sizeof *scene->surfaces, "surfaces", error);
     if (result != LX_OK) return result;
-    if (!lx_array_reserve(&scene->surfaces, &reader->surface_capacity, (size_t)scene->surface_count + mesh->primitive_count,
-                          sizeof *scene->surfaces))
+    if (!lx_array_reserve(&scene->surfaces, &reader->surface_capacity,
+                          (size_t)scene->surface_count + mesh->primitive_count, sizeof *scene->surfaces))
         return lx_fail_memory(error, "surfaces");
     instance->first_surface = scene->surface_count;
     for (uint32_t i = 0; i < mesh->primitive_count; ++i) {
@@ -113,7 +114,8 @@ cleanup:
     return result;
 }
 
-static lx_mat4 gpu_instance_matrix(const lx_gltf_reader *reader, const char *label, const gpu_instances *all, uint32_t i)
+static lx_mat4 gpu_instance_matrix(const lx_gltf_reader *reader, const char *label, const gpu_instances *all,
+                                   uint32_t i)
 {
     static const float zero[3] = {0, 0, 0}, one[3] = {1, 1, 1}, none[4] = {0, 0, 0, 1};
     const float *t = all->translation ? all->translation + 3 * (size_t)i : zero;
@@ -166,8 +168,10 @@ static lx_result load_instance(lx_gltf_reader *reader, uint32_t index, const lx_
     instance.density = node->extras.density > 0 ? node->extras.density : 1;
     instance.is_static = node->extras.is_static != 0 && !reason_to_move(node, skin >= 0);
     const lx_gltf_object gpu = lx_gltf_extension(object, "EXT_mesh_gpu_instancing");
-    if (gpu.json) LX_TRY(add_gpu_instances(reader, &gpu, &instance, node->extras.transparent, error));
-    else LX_TRY(add_instance(reader, instance, node->extras.transparent, error));
+    if (gpu.json)
+        LX_TRY(add_gpu_instances(reader, &gpu, &instance, node->extras.transparent, error));
+    else
+        LX_TRY(add_instance(reader, instance, node->extras.transparent, error));
 cleanup:
     return result;
 }
@@ -211,7 +215,13 @@ static lx_result note_movers(const lx_gltf_reader *reader, lx_error *error)
     return LX_OK;
 }
 
-// Bounds of a mesh by the vertices that its triangles use, transformed. False: one of them is NaN or infinite there.
+static bool is_in_reach(lx_vec3 p)
+{
+    return fabsf(p.x) <= MAX_COORDINATE && fabsf(p.y) <= MAX_COORDINATE && fabsf(p.z) <= MAX_COORDINATE; // NaN is not
+}
+
+// Bounds of a mesh by the vertices that its triangles use, transformed. False: one of them is NaN or out of reach
+// there.
 static bool mesh_bounds(const lx_scene *scene, const lx_mesh *mesh, lx_mat4 transform, lx_bounds *bounds)
 {
     *bounds = lx_bounds_empty();
@@ -219,15 +229,15 @@ static bool mesh_bounds(const lx_scene *scene, const lx_mesh *mesh, lx_mat4 tran
         const lx_primitive *p = &scene->primitives[mesh->first_primitive + i];
         for (size_t k = 0; k < 3 * (size_t)p->triangle_count; ++k) {
             const lx_vec3 point = lx_mat4_point(transform, p->positions[p->indices[k]]);
-            if (!lx_is_finite3(point)) return false;
+            if (!is_in_reach(point)) return false;
             lx_bounds_add(bounds, point);
         }
     }
     return true;
 }
 
-// The same from the corners of the mesh's own box: looser, but at a cost that does not grow with the mesh. All partial sums for
-// points in the box lie between those for its corners, so what is finite at the corners is finite inside.
+// The same from the corners of the mesh's own box: looser, but at a cost that does not grow with the mesh. All partial
+// sums for points in the box lie between those for its corners, so what is in reach at the corners is in reach inside.
 static bool corner_bounds(const lx_bounds *local, lx_mat4 transform, lx_bounds *bounds)
 {
     *bounds = lx_bounds_empty();
@@ -235,7 +245,7 @@ static bool corner_bounds(const lx_bounds *local, lx_mat4 transform, lx_bounds *
         const lx_vec3 corner = {i & 1 ? local->high.x : local->low.x, i & 2 ? local->high.y : local->low.y,
                                 i & 4 ? local->high.z : local->low.z};
         const lx_vec3 point = lx_mat4_point(transform, corner);
-        if (!lx_is_finite3(point)) return false;
+        if (!is_in_reach(point)) return false;
         lx_bounds_add(bounds, point);
     }
     return true;
@@ -244,7 +254,8 @@ static bool corner_bounds(const lx_bounds *local, lx_mat4 transform, lx_bounds *
 static uint64_t mesh_triangles(const lx_scene *scene, const lx_mesh *mesh)
 {
     uint64_t count = 0;
-    for (uint32_t p = 0; p < mesh->primitive_count; ++p) count += scene->primitives[mesh->first_primitive + p].triangle_count;
+    for (uint32_t p = 0; p < mesh->primitive_count; ++p)
+        count += scene->primitives[mesh->first_primitive + p].triangle_count;
     return count;
 }
 
@@ -257,14 +268,15 @@ static lx_result sum_up(lx_scene *scene, const lx_bounds *boxes, const uint64_t 
         const uint64_t count = sizes[instance->mesh];
         triangles += count;
         if (triangles > MAX_TRIANGLES)
-            return lx_fail(error, LX_ERROR_LIMIT, "node %u '%.60s': more than 2^31 triangles in all instances", instance->node,
-                           instance->name);
+            return lx_fail(error, LX_ERROR_LIMIT, "node %u '%.60s': more than 2^31 triangles in all instances",
+                           instance->node, instance->name);
         lx_bounds bounds;
-        const bool finite = triangles <= MAX_MEASURED
-                                ? mesh_bounds(scene, &scene->meshes[instance->mesh], instance->transform, &bounds)
-                                : corner_bounds(&boxes[instance->mesh], instance->transform, &bounds);
-        if (!finite)
-            return lx_fail(error, LX_ERROR_FORMAT, "node %u '%.60s': its vertices are not finite in the world", instance->node,
+        const bool in_reach = triangles <= MAX_MEASURED
+                                  ? mesh_bounds(scene, &scene->meshes[instance->mesh], instance->transform, &bounds)
+                                  : corner_bounds(&boxes[instance->mesh], instance->transform, &bounds);
+        if (!in_reach)
+            return lx_fail(error, LX_ERROR_FORMAT,
+                           "node %u '%.60s': its vertices are not finite in the world, or 1e15 m away", instance->node,
                            instance->name);
         if (!instance->is_static) continue;
         scene->triangle_count += count;
@@ -280,7 +292,8 @@ static lx_result measure(lx_scene *scene, lx_error *error)
     uint64_t *sizes = lx_malloc_array(scene->mesh_count, sizeof *sizes);
     lx_result result = boxes && sizes ? LX_OK : lx_fail_memory(error, "bounds");
     for (uint32_t i = 0; result == LX_OK && i < scene->mesh_count; ++i) {
-        mesh_bounds(scene, &scene->meshes[i], lx_mat4_identity(), &boxes[i]); // finite: the accessors were
+        if (!mesh_bounds(scene, &scene->meshes[i], lx_mat4_identity(), &boxes[i]))
+            boxes[i] = (lx_bounds){{-INFINITY, -INFINITY, -INFINITY}, {INFINITY, INFINITY, INFINITY}};
         sizes[i] = mesh_triangles(scene, &scene->meshes[i]);
     }
     if (result == LX_OK) result = sum_up(scene, boxes, sizes, error);

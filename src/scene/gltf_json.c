@@ -18,8 +18,10 @@ static lx_result check_nesting(const char *text, size_t size, lx_error *error)
     for (size_t i = 0; i < size; ++i) {
         const char c = text[i];
         if (in_string) {
-            if (c == '\\') ++i;
-            else if (c == '"') in_string = false;
+            if (c == '\\')
+                ++i;
+            else if (c == '"')
+                in_string = false;
         } else if (c == '"') {
             in_string = true;
         } else if (c == '{' || c == '[') {
@@ -55,10 +57,7 @@ lx_result lx_gltf_json_parse(const char *text, size_t size, json_t **out_root, l
     return LX_OK;
 }
 
-void lx_gltf_document_release(struct json_t *root)
-{
-    json_decref(root);
-}
+void lx_gltf_document_release(struct json_t *root) { json_decref(root); }
 
 // Bytes of `text` to show when at most `limit` are wanted, without cutting a UTF-8 sequence.
 static int shown_length(const char *text, size_t limit)
@@ -75,7 +74,8 @@ lx_gltf_object lx_gltf_object_of(json_t *json, const char *kind, uint32_t index)
     lx_gltf_object object = {.json = json};
     const char *name = json_string_value(json_object_get(json, "name"));
     if (name && name[0])
-        snprintf(object.label, sizeof object.label, "%s %u '%.*s'", kind, index, shown_length(name, max_label_name), name);
+        snprintf(object.label, sizeof object.label, "%s %u '%.*s'", kind, index, shown_length(name, max_label_name),
+                 name);
     else
         snprintf(object.label, sizeof object.label, "%s %u", kind, index);
     return object;
@@ -109,7 +109,8 @@ lx_result lx_gltf_get_object(const lx_gltf_object *object, const char *key, lx_g
     return LX_OK;
 }
 
-lx_result lx_gltf_get_array(const lx_gltf_object *object, const char *key, json_t **out, uint32_t *count, lx_error *error)
+lx_result lx_gltf_get_array(const lx_gltf_object *object, const char *key, json_t **out, uint32_t *count,
+                            lx_error *error)
 {
     json_t *value = json_object_get(object->json, key);
     if (value && !json_is_array(value)) return wrong_type(object, key, "an array", error);
@@ -153,8 +154,8 @@ lx_result lx_gltf_get_float(const lx_gltf_object *object, const char *key, float
     return wrong_type(object, key, "a finite number", error);
 }
 
-lx_result lx_gltf_get_floats(const lx_gltf_object *object, const char *key, float *values, uint32_t count, bool *present,
-                             lx_error *error)
+lx_result lx_gltf_get_floats(const lx_gltf_object *object, const char *key, float *values, uint32_t count,
+                             bool *present, lx_error *error)
 {
     const json_t *json = json_object_get(object->json, key);
     if (present) *present = json != NULL;
@@ -204,12 +205,13 @@ lx_result lx_gltf_index_of(const lx_gltf_object *object, const json_t *value, co
     return LX_OK;
 }
 
-lx_result lx_gltf_get_index(const lx_gltf_object *object, const char *key, uint32_t count, int32_t *index, lx_error *error)
+lx_result lx_gltf_get_index(const lx_gltf_object *object, const char *key, uint32_t count, int32_t *index,
+                            lx_error *error)
 {
     const json_t *json = json_object_get(object->json, key);
     *index = -1;
     if (!json) return LX_OK;
-    uint32_t number;
+    uint32_t number = 0;
     const lx_result result = lx_gltf_index_of(object, json, key, count, &number, error);
     if (result == LX_OK) *index = (int32_t)number;
     return result;

@@ -1,7 +1,7 @@
 // Lights: KHR_lights_punctual and area lights by `luxel_area`.
 //
-// Based on: KHR_lights_punctual (Khronos extension). Lights shine along -Z of their node; its scale is ignored, except that an
-// area light's edges are as long as the node makes them.
+// Based on: KHR_lights_punctual (Khronos extension). Lights shine along -Z of their node; its scale is ignored, except
+// that an area light's edges are as long as the node makes them.
 #include "scene/gltf_reader.h"
 
 #include "base/error.h"
@@ -23,10 +23,14 @@ static lx_result read_kind(const lx_gltf_object *object, lx_light_kind *out, lx_
     const char *type = "";
     const lx_result result = lx_gltf_get_string(object, "type", &type, error);
     if (result != LX_OK) return result;
-    if (strcmp(type, "point") == 0) *out = LX_LIGHT_POINT;
-    else if (strcmp(type, "spot") == 0) *out = LX_LIGHT_SPOT;
-    else if (strcmp(type, "directional") == 0) *out = LX_LIGHT_DIRECTIONAL;
-    else return lx_fail(error, LX_ERROR_FORMAT, "%s: unknown type '%.20s'", object->label, type);
+    if (strcmp(type, "point") == 0)
+        *out = LX_LIGHT_POINT;
+    else if (strcmp(type, "spot") == 0)
+        *out = LX_LIGHT_SPOT;
+    else if (strcmp(type, "directional") == 0)
+        *out = LX_LIGHT_DIRECTIONAL;
+    else
+        return lx_fail(error, LX_ERROR_FORMAT, "%s: unknown type '%.20s'", object->label, type);
     return LX_OK;
 }
 
@@ -41,8 +45,8 @@ static lx_result read_cone(const lx_gltf_object *object, lamp *out, lx_error *er
     LX_TRY(lx_gltf_get_float(&spot, "innerConeAngle", &out->inner_angle, error));
     LX_TRY(lx_gltf_get_float(&spot, "outerConeAngle", &out->outer_angle, error));
     if (out->inner_angle < 0 || out->inner_angle >= out->outer_angle)
-        return lx_fail(error, LX_ERROR_FORMAT, "%s: innerConeAngle %g is not from 0 to below outerConeAngle %g", object->label,
-                       (double)out->inner_angle, (double)out->outer_angle);
+        return lx_fail(error, LX_ERROR_FORMAT, "%s: innerConeAngle %g is not from 0 to below outerConeAngle %g",
+                       object->label, (double)out->inner_angle, (double)out->outer_angle);
     if (out->outer_angle > right_angle + 1e-4f) // rounding of an exporter is no error
         return lx_fail(error, LX_ERROR_FORMAT, "%s: outerConeAngle %g is more than pi/2", object->label,
                        (double)out->outer_angle);
@@ -130,7 +134,8 @@ static bool make_area(const lx_mat4 *world, const lx_gltf_extras *extras, bool f
 static lx_result add_light(lx_gltf_reader *reader, const lx_light *light, const lx_gltf_light_use *use, lx_error *error)
 {
     lx_scene *scene = reader->scene;
-    if (!lx_array_reserve(&scene->lights, &reader->light_capacity, (size_t)scene->light_count + 1, sizeof *scene->lights) ||
+    if (!lx_array_reserve(&scene->lights, &reader->light_capacity, (size_t)scene->light_count + 1,
+                          sizeof *scene->lights) ||
         !lx_array_reserve(&reader->light_uses, &reader->light_use_capacity, (size_t)scene->light_count + 1,
                           sizeof *reader->light_uses))
         return lx_fail_memory(error, "lights");
@@ -141,14 +146,15 @@ static lx_result add_light(lx_gltf_reader *reader, const lx_light *light, const 
 
 static void tell_area_limits(const lx_gltf_reader *reader, const lx_gltf_object *node, lx_light_kind kind)
 {
-    if (kind == LX_LIGHT_SPOT) lx_log_note(reader->log, "%s: with luxel_area the spot's cone angles are ignored", node->label);
+    if (kind == LX_LIGHT_SPOT)
+        lx_log_note(reader->log, "%s: with luxel_area the spot's cone angles are ignored", node->label);
     if (kind == LX_LIGHT_DIRECTIONAL)
         lx_log_warning(reader->log, "%s: luxel_area makes no sense for a directional light; ignored", node->label);
 }
 
 // Puts `source` (a light of the file, or none) at the node.
-static lx_result place_lamp(lx_gltf_reader *reader, uint32_t index, const lx_gltf_object *node_object, const lamp *source,
-                            lx_error *error)
+static lx_result place_lamp(lx_gltf_reader *reader, uint32_t index, const lx_gltf_object *node_object,
+                            const lamp *source, lx_error *error)
 {
     lx_result result = LX_OK;
     const lx_gltf_node *node = &reader->nodes[index];
@@ -166,13 +172,16 @@ static lx_result place_lamp(lx_gltf_reader *reader, uint32_t index, const lx_glt
         .outer_angle = source->outer_angle,
         .radius = fmaxf(use.extras.radius, 0) * (source->kind == LX_LIGHT_DIRECTIONAL ? LX_PI / 180 : 1),
     };
-    use.realtime = node->moves || use.extras.mode == LX_MODE_REALTIME || (use.extras.mode < 0 && use.extras.is_static == 0);
+    use.realtime =
+        node->moves || use.extras.mode == LX_MODE_REALTIME || (use.extras.mode < 0 && use.extras.is_static == 0);
     const bool wants_area = use.extras.area != LX_AREA_NONE;
     if (wants_area && from_lamp) tell_area_limits(reader, node_object, source->kind);
     if (wants_area && (!from_lamp || source->kind != LX_LIGHT_DIRECTIONAL)) {
         lx_light area = light;
-        if (make_area(&node->world, &use.extras, from_lamp, &area)) light = area;
-        else lx_log_warning(reader->log, "%s: luxel_area has no area in the world; ignored", node_object->label);
+        if (make_area(&node->world, &use.extras, from_lamp, &area))
+            light = area;
+        else
+            lx_log_warning(reader->log, "%s: luxel_area has no area in the world; ignored", node_object->label);
         if (light.kind == source->kind && !from_lamp) return LX_OK;
     }
     LX_TRY(lx_gltf_name(reader, node_object, from_lamp ? &source->object : NULL, "light", reader->scene->light_count,
@@ -187,12 +196,13 @@ static lx_result light_of_node(const lx_gltf_reader *reader, const lx_gltf_objec
 {
     const lx_gltf_object extension = lx_gltf_extension(node, "KHR_lights_punctual");
     const lx_result result = lx_gltf_get_index(&extension, "light", reader->counts[LX_GLTF_LIGHT], out, error);
-    if (result == LX_OK && extension.json && *out < 0) return lx_fail(error, LX_ERROR_FORMAT, "%s: no light", extension.label);
+    if (result == LX_OK && extension.json && *out < 0)
+        return lx_fail(error, LX_ERROR_FORMAT, "%s: no light", extension.label);
     return result;
 }
 
-// A luxel_area on a node shapes the lamps below it (Blender used to put lamps on a child node). Where there are none, the node
-// itself shines.
+// A luxel_area on a node shapes the lamps below it (Blender used to put lamps on a child node). Where there are none,
+// the node itself shines.
 static lx_result find_area_takers(lx_gltf_reader *reader, const lamp *lamps, lx_error *error)
 {
     for (uint32_t i = 0; i < reader->counts[LX_GLTF_NODE]; ++i) {
@@ -210,7 +220,8 @@ static lx_result find_area_takers(lx_gltf_reader *reader, const lamp *lamps, lx_
 
 static lx_result load_node_light(lx_gltf_reader *reader, uint32_t index, const lamp *lamps, lx_error *error)
 {
-    static const lamp no_lamp = {.kind = LX_LIGHT_POINT, .extras = {.mode = -1, .is_static = -1, .transparent = -1, .radius = -1}};
+    static const lamp no_lamp = {.kind = LX_LIGHT_POINT,
+                                 .extras = {.mode = -1, .is_static = -1, .transparent = -1, .radius = -1}};
     lx_gltf_object object;
     int32_t light;
     const lx_gltf_node *node = &reader->nodes[index];
@@ -218,7 +229,8 @@ static lx_result load_node_light(lx_gltf_reader *reader, uint32_t index, const l
     if (result == LX_OK) result = light_of_node(reader, &object, &light, error);
     if (result != LX_OK || !node->in_scene || node->holds_no_lamps) return result;
     if (light >= 0) return place_lamp(reader, index, &object, &lamps[light], error);
-    if (node->area_owner == (int32_t)index && !node->area_taken) return place_lamp(reader, index, &object, &no_lamp, error);
+    if (node->area_owner == (int32_t)index && !node->area_taken)
+        return place_lamp(reader, index, &object, &no_lamp, error);
     return LX_OK;
 }
 

@@ -27,8 +27,8 @@ cleanup:
     return result;
 }
 
-static lx_result read_slot(const lx_gltf_reader *reader, const lx_gltf_object *holder, const char *key, lx_texture_slot *slot,
-                           lx_error *error)
+static lx_result read_slot(const lx_gltf_reader *reader, const lx_gltf_object *holder, const char *key,
+                           lx_texture_slot *slot, lx_error *error)
 {
     lx_result result = LX_OK;
     lx_gltf_object info;
@@ -99,7 +99,8 @@ cleanup:
 }
 
 // The factor is kept in 0…1; what some exporters write above 1 moves to the strength.
-static lx_result read_emission(const lx_gltf_reader *reader, const lx_gltf_object *object, lx_material *out, lx_error *error)
+static lx_result read_emission(const lx_gltf_reader *reader, const lx_gltf_object *object, lx_material *out,
+                               lx_error *error)
 {
     lx_result result = LX_OK;
     float factor[3] = {0, 0, 0}, strength = 1;
@@ -113,7 +114,8 @@ static lx_result read_emission(const lx_gltf_reader *reader, const lx_gltf_objec
     const float excess = fmaxf(lx_rgb_max(out->emissive_factor), 1);
     out->emissive_factor = lx_rgb_scale(out->emissive_factor, 1 / excess);
     out->emissive_strength = fmaxf(strength, 0) * excess * reader->emission_scale;
-    if (!isfinite(out->emissive_strength)) return lx_fail(error, LX_ERROR_FORMAT, "%s: emission is infinite", object->label);
+    if (!isfinite(out->emissive_strength))
+        return lx_fail(error, LX_ERROR_FORMAT, "%s: emission is infinite", object->label);
 cleanup:
     return result;
 }
@@ -124,10 +126,15 @@ static lx_result read_alpha(const lx_gltf_object *object, lx_material *out, lx_e
     const char *mode = "OPAQUE";
     LX_TRY(lx_gltf_get_string(object, "alphaMode", &mode, error));
     LX_TRY(lx_gltf_get_float(object, "alphaCutoff", &out->alpha_cutoff, error));
-    if (strcmp(mode, "OPAQUE") == 0) out->alpha_mode = LX_ALPHA_OPAQUE;
-    else if (strcmp(mode, "MASK") == 0) out->alpha_mode = LX_ALPHA_MASK;
-    else if (strcmp(mode, "BLEND") == 0) out->alpha_mode = LX_ALPHA_BLEND;
-    else return lx_fail(error, LX_ERROR_FORMAT, "%s: alphaMode '%.20s' is not OPAQUE, MASK or BLEND", object->label, mode);
+    if (strcmp(mode, "OPAQUE") == 0)
+        out->alpha_mode = LX_ALPHA_OPAQUE;
+    else if (strcmp(mode, "MASK") == 0)
+        out->alpha_mode = LX_ALPHA_MASK;
+    else if (strcmp(mode, "BLEND") == 0)
+        out->alpha_mode = LX_ALPHA_BLEND;
+    else
+        return lx_fail(error, LX_ERROR_FORMAT, "%s: alphaMode '%.20s' is not OPAQUE, MASK or BLEND", object->label,
+                       mode);
 cleanup:
     return result;
 }
@@ -135,8 +142,8 @@ cleanup:
 static lx_result read_authoring(lx_gltf_reader *reader, const lx_gltf_object *object, lx_material *out, lx_error *error)
 {
     lx_gltf_extras extras;
-    const lx_result result = lx_gltf_extras_read(reader->log, &reader->scene->strings, object, LX_EXTRAS_MATERIAL, &extras,
-                                                 &reader->luxel_key_count, error);
+    const lx_result result = lx_gltf_extras_read(reader->log, &reader->scene->strings, object, LX_EXTRAS_MATERIAL,
+                                                 &extras, &reader->luxel_key_count, error);
     if (result != LX_OK) return result;
     out->transparent = extras.transparent == 1;
     out->mode = extras.mode >= 0 ? (lx_light_mode)extras.mode : LX_MODE_BAKED;

@@ -91,7 +91,8 @@ static lx_result read_colors(primitive_job *job, lx_error *error)
     }
     for (uint32_t i = 0; i < count; ++i) {
         const float *v = values + (size_t)i * components;
-        job->out.colors[i] = (lx_vec4){fmaxf(v[0], 0), fmaxf(v[1], 0), fmaxf(v[2], 0), components == 4 ? lx_clamp(v[3], 0, 1) : 1};
+        job->out.colors[i] =
+            (lx_vec4){fmaxf(v[0], 0), fmaxf(v[1], 0), fmaxf(v[2], 0), components == 4 ? lx_clamp(v[3], 0, 1) : 1};
     }
 cleanup:
     lx_free(values);
@@ -110,7 +111,8 @@ static lx_result read_attributes(primitive_job *job, lx_error *error)
     out->normals = (lx_vec3 *)values;
     for (int set = 0; set < lx_texcoord_sets; ++set) {
         values = NULL;
-        LX_TRY(read_attribute(job->reader, &job->attributes, texcoord_names[set], 2, out->vertex_count, &values, error));
+        LX_TRY(
+            read_attribute(job->reader, &job->attributes, texcoord_names[set], 2, out->vertex_count, &values, error));
         out->texcoords[set] = (lx_vec2 *)values;
     }
     LX_TRY(read_colors(job, error));
@@ -177,8 +179,8 @@ static lx_result apply_targets(primitive_job *job, lx_error *error)
     bool moved = false;
     LX_TRY(lx_gltf_get_array(&job->object, "targets", &targets, &count, error));
     if (job->weight_count > 0 && count != job->weight_count)
-        return lx_fail(error, LX_ERROR_FORMAT, "%s: %u weights for %u morph targets", job->object.label, job->weight_count,
-                       count);
+        return lx_fail(error, LX_ERROR_FORMAT, "%s: %u weights for %u morph targets", job->object.label,
+                       job->weight_count, count);
     for (uint32_t i = 0; i < job->weight_count; ++i) {
         char what[32];
         snprintf(what, sizeof what, "target %u", i);
@@ -251,8 +253,8 @@ static lx_result refuse_draco(const primitive_job *job, const lx_gltf_accessor *
 {
     const lx_gltf_object draco = lx_gltf_extension(&job->object, "KHR_draco_mesh_compression");
     if (!draco.json || positions->view >= 0 || positions->sparse.count > 0) return LX_OK;
-    return lx_fail(error, LX_ERROR_UNSUPPORTED, "%s: KHR_draco_mesh_compression is not supported; %s", job->object.label,
-                   lx_gltf_draco_advice());
+    return lx_fail(error, LX_ERROR_UNSUPPORTED, "%s: KHR_draco_mesh_compression is not supported; %s",
+                   job->object.label, lx_gltf_draco_advice());
 }
 
 static lx_result read_primitive(primitive_job *job, mesh_report *report, lx_error *error)
@@ -265,7 +267,8 @@ static lx_result read_primitive(primitive_job *job, mesh_report *report, lx_erro
     if (mode > LX_TRIANGLE_FAN)
         return lx_fail(error, LX_ERROR_FORMAT, "%s: unknown mode %llu", job->object.label, (unsigned long long)mode);
     LX_TRY(lx_gltf_get_object(&job->object, "attributes", &job->attributes, error));
-    LX_TRY(lx_gltf_get_index(&job->attributes, "POSITION", job->reader->counts[LX_GLTF_ACCESSOR], &position_index, error));
+    LX_TRY(
+        lx_gltf_get_index(&job->attributes, "POSITION", job->reader->counts[LX_GLTF_ACCESSOR], &position_index, error));
     report->skipped_modes += mode < LX_TRIANGLES;
     report->without_positions += mode >= LX_TRIANGLES && position_index < 0;
     if (mode < LX_TRIANGLES || position_index < 0) return LX_OK;
@@ -277,7 +280,8 @@ static lx_result read_primitive(primitive_job *job, mesh_report *report, lx_erro
     LX_TRY(read_triangles(job, (lx_topology)mode, report, error));
     if (job->out.triangle_count == 0) return LX_OK;
     if (job->out.normals) report->repaired_normals += lx_repair_normals(&job->out);
-    if (mode == LX_TRIANGLES) report->degenerate += lx_count_degenerate_triangles(&job->out); // strips have them on purpose
+    if (mode == LX_TRIANGLES)
+        report->degenerate += lx_count_degenerate_triangles(&job->out); // strips have them on purpose
     LX_TRY(lx_gltf_get_index(&job->object, "material", job->reader->counts[LX_GLTF_MATERIAL], &material, error));
     job->out.material = lx_gltf_material_index(job->reader, material);
     LX_TRY(add_primitive(job->reader, &job->out, error));
@@ -288,12 +292,16 @@ cleanup:
 
 static void tell(lx_log *log, const char *label, const mesh_report *report)
 {
-    if (report->skipped_modes) lx_log_warning(log, "%s: %u primitives of points or lines are skipped", label, report->skipped_modes);
-    if (report->without_positions) lx_log_warning(log, "%s: %u primitives without POSITION are skipped", label, report->without_positions);
-    if (report->cut_triangles) lx_log_warning(log, "%s: %u primitives end in an incomplete triangle", label, report->cut_triangles);
+    if (report->skipped_modes)
+        lx_log_warning(log, "%s: %u primitives of points or lines are skipped", label, report->skipped_modes);
+    if (report->without_positions)
+        lx_log_warning(log, "%s: %u primitives without POSITION are skipped", label, report->without_positions);
+    if (report->cut_triangles)
+        lx_log_warning(log, "%s: %u primitives end in an incomplete triangle", label, report->cut_triangles);
     if (report->degenerate) lx_log_warning(log, "%s: %u degenerate triangles (no area)", label, report->degenerate);
     if (report->repaired_normals)
-        lx_log_note(log, "%s: %u normals without length are replaced by those of the triangles", label, report->repaired_normals);
+        lx_log_note(log, "%s: %u normals without length are replaced by those of the triangles", label,
+                    report->repaired_normals);
 }
 
 static lx_result read_primitives(lx_gltf_reader *reader, uint32_t file_mesh, const lx_gltf_object *object,
@@ -334,7 +342,8 @@ static int32_t find_variant(const lx_gltf_reader *reader, uint32_t file_mesh, co
     int32_t index = reader->first_variant[file_mesh];
     for (; index >= 0; index = reader->variants[index].next) {
         const lx_gltf_mesh_variant *variant = &reader->variants[index];
-        if (variant->weight_count == count && (count == 0 || memcmp(variant->weights, weights, count * sizeof *weights) == 0))
+        if (variant->weight_count == count &&
+            (count == 0 || memcmp(variant->weights, weights, count * sizeof *weights) == 0))
             break;
     }
     return index;
@@ -345,13 +354,17 @@ static lx_result add_variant(lx_gltf_reader *reader, uint32_t file_mesh, float *
                              lx_error *error)
 {
     lx_scene *scene = reader->scene;
-    if (!lx_array_reserve(&reader->variants, &reader->variant_capacity, reader->variant_count + 1, sizeof *reader->variants) ||
-        !lx_array_reserve(&scene->meshes, &reader->mesh_capacity, (size_t)scene->mesh_count + 1, sizeof *scene->meshes)) {
+    if (!lx_array_reserve(&reader->variants, &reader->variant_capacity, reader->variant_count + 1,
+                          sizeof *reader->variants) ||
+        !lx_array_reserve(&scene->meshes, &reader->mesh_capacity, (size_t)scene->mesh_count + 1,
+                          sizeof *scene->meshes)) {
         lx_free(weights);
         return lx_fail_memory(error, "meshes");
     }
-    reader->variants[reader->variant_count] = (lx_gltf_mesh_variant){
-        .mesh = scene->mesh_count, .next = reader->first_variant[file_mesh], .weights = weights, .weight_count = weight_count};
+    reader->variants[reader->variant_count] = (lx_gltf_mesh_variant){.mesh = scene->mesh_count,
+                                                                     .next = reader->first_variant[file_mesh],
+                                                                     .weights = weights,
+                                                                     .weight_count = weight_count};
     reader->first_variant[file_mesh] = (int32_t)reader->variant_count++;
     lx_mesh mesh = {.first_primitive = scene->primitive_count, .file_index = file_mesh};
     lx_result result = LX_OK;
@@ -396,7 +409,8 @@ static lx_result check_attributes(const lx_gltf_reader *reader, const lx_gltf_ob
     json_object_foreach(attributes->json, name, value)
     {
         uint32_t index;
-        const lx_result result = lx_gltf_index_of(attributes, value, name, reader->counts[LX_GLTF_ACCESSOR], &index, error);
+        const lx_result result =
+            lx_gltf_index_of(attributes, value, name, reader->counts[LX_GLTF_ACCESSOR], &index, error);
         if (result != LX_OK) return result;
     }
     return LX_OK;

@@ -1,5 +1,5 @@
-// The node hierarchy: who is whose child, what the default scene reaches, where things are in the world, what moves, and which
-// authoring keys are handed down. Nothing here recurses, so depth costs no stack.
+// The node hierarchy: who is whose child, what the default scene reaches, where things are in the world, what moves,
+// and which authoring keys are handed down. Nothing here recurses, so depth costs no stack.
 #include "scene/gltf_reader.h"
 
 #include "base/error.h"
@@ -23,7 +23,8 @@ static lx_result adopt(lx_gltf_reader *reader, const lx_gltf_object *parent, uin
     }
     const lx_result result = lx_gltf_element(reader, LX_GLTF_NODE, child, &object, error);
     if (result != LX_OK) return result;
-    return lx_fail(error, LX_ERROR_FORMAT, "%s: is a child of node %d and of %s", object.label, node->parent, parent->label);
+    return lx_fail(error, LX_ERROR_FORMAT, "%s: is a child of node %d and of %s", object.label, node->parent,
+                   parent->label);
 }
 
 static lx_result link_nodes(lx_gltf_reader *reader, lx_error *error)
@@ -49,8 +50,8 @@ cleanup:
     return result;
 }
 
-// Every node has at most one parent now, so what no root leads to is a ring. Fills `order` with all nodes below the given
-// roots, parents first; `order` holds the roots already.
+// Every node has at most one parent now, so what no root leads to is a ring. Fills `order` with all nodes below the
+// given roots, parents first; `order` holds the roots already.
 static lx_result spread(lx_gltf_reader *reader, uint32_t *order, uint32_t *order_count, lx_error *error)
 {
     lx_result result = LX_OK;
@@ -67,7 +68,8 @@ static lx_result spread(lx_gltf_reader *reader, uint32_t *order, uint32_t *order
         LX_TRY(lx_gltf_element(reader, LX_GLTF_NODE, order[at], &object, error));
         LX_TRY(lx_gltf_get_array(&object, "children", &children, &child_count, error));
         for (uint32_t c = 0; c < child_count; ++c) {
-            LX_TRY(lx_gltf_index_of(&object, json_array_get(children, c), "child", reader->counts[LX_GLTF_NODE], &child, error));
+            LX_TRY(lx_gltf_index_of(&object, json_array_get(children, c), "child", reader->counts[LX_GLTF_NODE], &child,
+                                    error));
             order[(*order_count)++] = child;
         }
     }
@@ -114,8 +116,8 @@ static lx_result take_scene_roots(lx_gltf_reader *reader, const lx_gltf_object *
         LX_TRY(lx_gltf_index_of(scene, json_array_get(roots, i), "node", reader->counts[LX_GLTF_NODE], &root, error));
         lx_gltf_node *node = &reader->nodes[root];
         if (node->parent >= 0)
-            return lx_fail(error, LX_ERROR_FORMAT, "%s: node %u is not a root but a child of node %d", scene->label, root,
-                           node->parent);
+            return lx_fail(error, LX_ERROR_FORMAT, "%s: node %u is not a root but a child of node %d", scene->label,
+                           root, node->parent);
         if (node->in_scene) return lx_fail(error, LX_ERROR_FORMAT, "%s: node %u is named twice", scene->label, root);
         node->in_scene = true;
         reader->order[reader->order_count++] = root;
@@ -144,7 +146,8 @@ static lx_result reach_default_scene(lx_gltf_reader *reader, lx_error *error)
     LX_TRY(spread(reader, reader->order, &reader->order_count, error));
     for (uint32_t i = 0; i < reader->order_count; ++i) reader->nodes[reader->order[i]].in_scene = true;
     if (reader->counts[LX_GLTF_SCENE] > 1)
-        lx_log_note(reader->log, "%s is read, the other %u scenes are not", scene.label, reader->counts[LX_GLTF_SCENE] - 1);
+        lx_log_note(reader->log, "%s is read, the other %u scenes are not", scene.label,
+                    reader->counts[LX_GLTF_SCENE] - 1);
 cleanup:
     return result;
 }
@@ -183,7 +186,8 @@ static lx_result local_matrix(const lx_gltf_reader *reader, const lx_gltf_object
     LX_TRY(lx_gltf_get_floats(object, "translation", t, 3, NULL, error));
     LX_TRY(lx_gltf_get_floats(object, "rotation", q, 4, NULL, error));
     LX_TRY(lx_gltf_get_floats(object, "scale", s, 3, NULL, error));
-    *out = lx_mat4_trs(lx_v3(t[0], t[1], t[2]), lx_gltf_unit_rotation(reader->log, object->label, q), lx_v3(s[0], s[1], s[2]));
+    *out = lx_mat4_trs(lx_v3(t[0], t[1], t[2]), lx_gltf_unit_rotation(reader->log, object->label, q),
+                       lx_v3(s[0], s[1], s[2]));
 cleanup:
     return result;
 }
@@ -210,8 +214,10 @@ static bool is_transform(const char *path)
 
 static void mark_animated(lx_gltf_node *node, const char *path)
 {
-    if (is_transform(path)) node->transform_animated = true;
-    else if (strcmp(path, "weights") == 0) node->weights_animated = true;
+    if (is_transform(path))
+        node->transform_animated = true;
+    else if (strcmp(path, "weights") == 0)
+        node->weights_animated = true;
 }
 
 // KHR_animation_pointer: "/nodes/3/translation". Other pointers (colours, intensities) move nothing.

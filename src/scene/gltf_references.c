@@ -1,11 +1,11 @@
-// Indices that the importer does not follow itself, but that export keeps: skins, animations, textures that do not matter to
-// light. A file that points nowhere is refused here rather than handed on.
+// Indices that the importer does not follow itself, but that export keeps: skins, animations, textures that do not
+// matter to light. A file that points nowhere is refused here rather than handed on.
 #include "scene/gltf_reader.h"
 
 #include "base/error.h"
 
-static lx_result check_key(const lx_gltf_reader *reader, const lx_gltf_object *object, const char *key, lx_gltf_kind kind,
-                           lx_error *error)
+static lx_result check_key(const lx_gltf_reader *reader, const lx_gltf_object *object, const char *key,
+                           lx_gltf_kind kind, lx_error *error)
 {
     int32_t index;
     return lx_gltf_get_index(object, key, reader->counts[kind], &index, error);

@@ -88,9 +88,9 @@ static char *emitter_name(const source_list *list, uint32_t node, uint32_t mater
 
 // Scratch: the emissive materials of one node, in the order of its surfaces.
 typedef struct emitters {
-    uint32_t *materials;     ///< [material_count]
-    int32_t *source;         ///< [material_count]: the source of a material on the node at hand.
-    uint32_t *seen_on;       ///< [material_count]: node + 1 on which the material was last met.
+    uint32_t *materials; ///< [material_count]
+    int32_t *source;     ///< [material_count]: the source of a material on the node at hand.
+    uint32_t *seen_on;   ///< [material_count]: node + 1 on which the material was last met.
     uint32_t count;
 } emitters;
 
@@ -193,7 +193,8 @@ lx_result lx_gltf_load_sources(lx_gltf_reader *reader, lx_error *error)
     LX_TRY(add_lights(&list, error));
     LX_TRY(add_emitters(&list, error));
     if (list.renamed > 0)
-        lx_log_warning(reader->log, "node %u: shares its name with another light and is called '%.80s' (%u such lights in all)",
+        lx_log_warning(reader->log,
+                       "node %u: shares its name with another light and is called '%.80s' (%u such lights in all)",
                        list.first_renamed_node, list.first_renamed, list.renamed);
 cleanup:
     lx_name_set_release(&list.names);

@@ -1,5 +1,5 @@
-// Content named by URI: data: URIs and files in the scene's folder. A scene is untrusted, so nothing outside of that folder
-// can be named, neither by the path nor through a symbolic link, and nothing is ever fetched.
+// Content named by URI: data: URIs and files in the scene's folder. A scene is untrusted, so nothing outside of that
+// folder can be named, neither by the path nor through a symbolic link, and nothing is ever fetched.
 #include "scene/gltf_reader.h"
 
 #include "base/error.h"
@@ -62,8 +62,8 @@ static bool base64_decode(const char *text, size_t length, uint8_t *out, size_t 
     return bit_count < 6;
 }
 
-static lx_result load_data_uri(const lx_gltf_reader *reader, const lx_gltf_object *object, const char *uri, lx_bytes *out,
-                               lx_error *error)
+static lx_result load_data_uri(const lx_gltf_reader *reader, const lx_gltf_object *object, const char *uri,
+                               lx_bytes *out, lx_error *error)
 {
     const char *comma = strchr(uri, ',');
     if (!comma) return lx_fail(error, LX_ERROR_FORMAT, "%s: data: URI without a comma", object->label);
@@ -94,14 +94,17 @@ static bool has_scheme(const char *uri)
     return *uri == ':';
 }
 
-// True if the path, read from its start, is ever above where it began. Backslashes count as slashes, to be safe everywhere.
+// True if the path, read from its start, is ever above where it began. Backslashes count as slashes, to be safe
+// everywhere.
 static bool climbs_out(const char *path)
 {
     long depth = 0;
     while (*path) {
         const size_t length = strcspn(path, "/\\");
-        if (length == 2 && path[0] == '.' && path[1] == '.') --depth;
-        else if (length > 0 && !(length == 1 && path[0] == '.')) ++depth;
+        if (length == 2 && path[0] == '.' && path[1] == '.')
+            --depth;
+        else if (length > 0 && !(length == 1 && path[0] == '.'))
+            ++depth;
         if (depth < 0) return true;
         path += length;
         path += *path != '\0';
@@ -113,10 +116,14 @@ static lx_result check_relative(const lx_gltf_object *object, const char *uri, c
                                 lx_error *error)
 {
     const char *problem = NULL;
-    if (length == 0) problem = "is empty";
-    else if (strlen(path) != length) problem = "contains a zero byte";
-    else if (path[0] == '/' || path[0] == '\\') problem = "is an absolute path";
-    else if (climbs_out(path)) problem = "leads out of the scene's folder";
+    if (length == 0)
+        problem = "is empty";
+    else if (strlen(path) != length)
+        problem = "contains a zero byte";
+    else if (path[0] == '/' || path[0] == '\\')
+        problem = "is an absolute path";
+    else if (climbs_out(path))
+        problem = "leads out of the scene's folder";
     if (!problem) return LX_OK;
     return lx_fail(error, LX_ERROR_FORMAT, "%s: URI '%.200s' %s", object->label, uri, problem);
 }
@@ -132,8 +139,10 @@ static lx_result load_file(lx_gltf_reader *reader, const lx_gltf_object *object,
                          object->label, relative);
     } else {
         result = lx_file_read(path, reader->max_file_bytes, out, error);
-        if (result == LX_OK) lx_gltf_grant(reader, out->size);
-        else lx_error_prefix(error, "%s: file '%.200s'", object->label, relative);
+        if (result == LX_OK)
+            lx_gltf_grant(reader, out->size);
+        else
+            lx_error_prefix(error, "%s: file '%.200s'", object->label, relative);
     }
     lx_free(path);
     return result;
@@ -152,7 +161,8 @@ lx_result lx_gltf_load_uri(lx_gltf_reader *reader, const lx_gltf_object *object,
     path[decoded] = '\0';
     lx_result result = check_relative(object, uri, path, decoded, error);
     if (result == LX_OK && !reader->folder)
-        result = lx_fail(error, LX_ERROR_FORMAT, "%s: external file '%.200s' is not available here", object->label, path);
+        result =
+            lx_fail(error, LX_ERROR_FORMAT, "%s: external file '%.200s' is not available here", object->label, path);
     if (result == LX_OK) result = load_file(reader, object, path, out, error);
     lx_free(path);
     return result;

@@ -60,7 +60,4 @@ bool lx_material_emits(const lx_material *material)
     return material->emissive_strength > 0 && lx_rgb_max(material->emissive_factor) > 0;
 }
 
-void lx_text_free(char *text)
-{
-    lx_free(text);
-}
+void lx_text_free(char *text) { lx_free(text); }

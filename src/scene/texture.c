@@ -71,8 +71,10 @@ lx_vec4 lx_texture_sample(const lx_scene *scene, const lx_texture_slot *slot, lx
         return fetch(image, wrap_texel(floorf(x), image->width, texture->wrap_s),
                      wrap_texel(floorf(y), image->height, texture->wrap_t), srgb);
     const float left = floorf(x - 0.5f), top = floorf(y - 0.5f); // texel centres lie at halves
-    const uint32_t x0 = wrap_texel(left, image->width, texture->wrap_s), x1 = wrap_texel(left + 1, image->width, texture->wrap_s);
-    const uint32_t y0 = wrap_texel(top, image->height, texture->wrap_t), y1 = wrap_texel(top + 1, image->height, texture->wrap_t);
+    const uint32_t x0 = wrap_texel(left, image->width, texture->wrap_s),
+                   x1 = wrap_texel(left + 1, image->width, texture->wrap_s);
+    const uint32_t y0 = wrap_texel(top, image->height, texture->wrap_t),
+                   y1 = wrap_texel(top + 1, image->height, texture->wrap_t);
     const float s = lx_clamp(x - 0.5f - left, 0, 1), t = lx_clamp(y - 0.5f - top, 0, 1);
     return mix(mix(fetch(image, x0, y0, srgb), fetch(image, x1, y0, srgb), s),
                mix(fetch(image, x0, y1, srgb), fetch(image, x1, y1, srgb), s), t);

@@ -1,5 +1,5 @@
-// Fuzz target: any bytes as a .glb or .gltf. External files are refused and sizes are small, so what is left is the importer.
-// Run: fuzz_gltf_import -dict=tests/fuzz/gltf.dict tests/fuzz/corpus/gltf
+// Fuzz target: any bytes as a .glb or .gltf. External files are refused and sizes are small, so what is left is the
+// importer. Run: fuzz_gltf_import -dict=tests/fuzz/gltf.dict tests/fuzz/corpus/gltf
 #include "base/context.h"
 #include "scene/gltf.h"
 

@@ -20,7 +20,7 @@
 #include <string.h>
 
 static lx_context *fixture_context;
-static char fixture_log[65536];  ///< "note: …\n" and "warning: …\n" since the last import.
+static char fixture_log[65536];    ///< "note: …\n" and "warning: …\n" since the last import.
 static uint8_t fixture_bin[65536]; ///< Buffer 0 of the next import.
 static size_t fixture_bin_size;
 
@@ -28,7 +28,8 @@ static void fixture_on_log(void *user, lx_log_level level, const char *message)
 {
     (void)user;
     const size_t length = strlen(fixture_log);
-    snprintf(fixture_log + length, sizeof fixture_log - length, "%s: %s\n", level == LX_LOG_WARNING ? "warning" : "note", message);
+    snprintf(fixture_log + length, sizeof fixture_log - length, "%s: %s\n",
+             level == LX_LOG_WARNING ? "warning" : "note", message);
 }
 
 static int fixture_setup(void **state)
@@ -47,10 +48,7 @@ static int fixture_teardown(void **state)
     return 0;
 }
 
-static inline void bin_clear(void)
-{
-    fixture_bin_size = 0;
-}
+static inline void bin_clear(void) { fixture_bin_size = 0; }
 
 static inline size_t bin_bytes(const void *data, size_t size)
 {
@@ -71,7 +69,8 @@ static inline void append_base64(char *out, const uint8_t *data, size_t size)
     static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     out += strlen(out);
     for (size_t i = 0; i < size; i += 3) {
-        const uint32_t bits = (uint32_t)data[i] << 16 | (i + 1 < size ? (uint32_t)data[i + 1] << 8 : 0) | (i + 2 < size ? data[i + 2] : 0u);
+        const uint32_t bits = (uint32_t)data[i] << 16 | (i + 1 < size ? (uint32_t)data[i + 1] << 8 : 0) |
+                              (i + 2 < size ? data[i + 2] : 0u);
         *out++ = digits[bits >> 18];
         *out++ = digits[bits >> 12 & 63];
         *out++ = i + 1 < size ? digits[bits >> 6 & 63] : '=';
@@ -86,7 +85,8 @@ static inline char *make_gltf(const char *members)
     char *text = malloc(strlen(members) + 2 * fixture_bin_size + 512);
     sprintf(text, "{\"asset\":{\"version\":\"2.0\"}");
     if (fixture_bin_size) {
-        sprintf(text + strlen(text), ",\"buffers\":[{\"byteLength\":%zu,\"uri\":\"data:application/octet-stream;base64,", fixture_bin_size);
+        sprintf(text + strlen(text),
+                ",\"buffers\":[{\"byteLength\":%zu,\"uri\":\"data:application/octet-stream;base64,", fixture_bin_size);
         append_base64(text, fixture_bin, fixture_bin_size);
         strcat(text, "\"}]");
     }
@@ -130,7 +130,8 @@ static inline void assert_refused(const char *members, lx_result code, const cha
         lx_scene_destroy(scene);
         fail_msg("not refused; expected: %s", start);
     }
-    if (result != code || strncmp(error.message, "t.gltf: ", 8) != 0 || strncmp(error.message + 8, start, strlen(start)) != 0)
+    if (result != code || strncmp(error.message, "t.gltf: ", 8) != 0 ||
+        strncmp(error.message + 8, start, strlen(start)) != 0)
         fail_msg("expected %d 't.gltf: %s', got %d '%s'", code, start, result, error.message);
 }
 
@@ -152,14 +153,18 @@ static inline void assert_near(double actual, double expected, double tolerance)
 static inline void assert_vec3(lx_vec3 actual, float x, float y, float z)
 {
     if (!(fabsf(actual.x - x) <= 1e-5f && fabsf(actual.y - y) <= 1e-5f && fabsf(actual.z - z) <= 1e-5f))
-        fail_msg("(%g %g %g) is not (%g %g %g)", (double)actual.x, (double)actual.y, (double)actual.z, (double)x, (double)y, (double)z);
+        fail_msg("(%g %g %g) is not (%g %g %g)", (double)actual.x, (double)actual.y, (double)actual.z, (double)x,
+                 (double)y, (double)z);
 }
 
 /// A triangle (0,0,0) (1,0,0) (0,1,0) as mesh 0, 'tri'; what follows adds to it.
-#define TRIANGLE_DATA "'bufferViews':[{'buffer':0,'byteLength':36}],'accessors':[{'bufferView':0,'componentType':5126,'count':3,'type':'VEC3'}]"
+#define TRIANGLE_DATA                                                                                                  \
+    "'bufferViews':[{'buffer':0,'byteLength':36}],'accessors':[{'bufferView':0,'componentType':5126,'count':3,'type':" \
+    "'VEC3'}]"
 #define TRIANGLE TRIANGLE_DATA ",'meshes':[{'name':'tri','primitives':[{'attributes':{'POSITION':0}}]}]"
 /// The same with material 0.
-#define TRIANGLE_MATERIAL TRIANGLE_DATA ",'meshes':[{'name':'tri','primitives':[{'attributes':{'POSITION':0},'material':0}]}]"
+#define TRIANGLE_MATERIAL                                                                                              \
+    TRIANGLE_DATA ",'meshes':[{'name':'tri','primitives':[{'attributes':{'POSITION':0},'material':0}]}]"
 #define ONE_NODE ",'nodes':[{'mesh':0}]"
 
 static inline void triangle_bin(void)

@@ -75,10 +75,11 @@ static void points_and_lines_are_skipped_with_one_warning(void **state)
 {
     (void)state;
     triangle_bin();
-    lx_scene *scene = import_members(TRIANGLE_DATA ",'meshes':[{'name':'mix','primitives':["
-                                                   "{'attributes':{'POSITION':0},'mode':0},{'attributes':{'POSITION':0},'mode':1},"
-                                                   "{'attributes':{'POSITION':0},'mode':2},{'attributes':{'POSITION':0},'mode':3},"
-                                                   "{'attributes':{}},{'attributes':{'POSITION':0}}]}]" ONE_NODE);
+    lx_scene *scene =
+        import_members(TRIANGLE_DATA ",'meshes':[{'name':'mix','primitives':["
+                                     "{'attributes':{'POSITION':0},'mode':0},{'attributes':{'POSITION':0},'mode':1},"
+                                     "{'attributes':{'POSITION':0},'mode':2},{'attributes':{'POSITION':0},'mode':3},"
+                                     "{'attributes':{}},{'attributes':{'POSITION':0}}]}]" ONE_NODE);
     assert_int_equal(scene->primitive_count, 1);
     assert_int_equal(scene->primitives[0].file_primitive, 5);
     assert_logged("warning: mesh 0 'mix': 4 primitives of points or lines are skipped");
@@ -151,11 +152,12 @@ static void sparse_accessor_replaces_elements(void **state)
     triangle_bin();
     BIN_U16(2, 0);
     BIN_FLOATS(0, 5, 0);
-    lx_scene *scene = import_members(
-        "'bufferViews':[{'buffer':0,'byteLength':36},{'buffer':0,'byteOffset':36,'byteLength':4},{'buffer':0,'byteOffset':40,'byteLength':12}],"
-        "'accessors':[{'bufferView':0,'componentType':5126,'count':3,'type':'VEC3','sparse':{'count':1,"
-        "'indices':{'bufferView':1,'componentType':5123},'values':{'bufferView':2}}}],"
-        "'meshes':[{'primitives':[{'attributes':{'POSITION':0}}]}]" ONE_NODE);
+    lx_scene *scene =
+        import_members("'bufferViews':[{'buffer':0,'byteLength':36},{'buffer':0,'byteOffset':36,'byteLength':4},{'"
+                       "buffer':0,'byteOffset':40,'byteLength':12}],"
+                       "'accessors':[{'bufferView':0,'componentType':5126,'count':3,'type':'VEC3','sparse':{'count':1,"
+                       "'indices':{'bufferView':1,'componentType':5123},'values':{'bufferView':2}}}],"
+                       "'meshes':[{'primitives':[{'attributes':{'POSITION':0}}]}]" ONE_NODE);
     assert_vec3(scene->primitives[0].positions[1], 1, 0, 0);
     assert_vec3(scene->primitives[0].positions[2], 0, 5, 0);
     lx_scene_destroy(scene);
@@ -167,10 +169,11 @@ static void sparse_accessor_without_view_starts_from_zeros(void **state)
     bin_clear();
     BIN_U8(1, 2, 0, 0);
     BIN_FLOATS(3, 0, 0, 0, 4, 0);
-    lx_scene *scene = import_members("'bufferViews':[{'buffer':0,'byteLength':4},{'buffer':0,'byteOffset':4,'byteLength':24}],"
-                                     "'accessors':[{'componentType':5126,'count':3,'type':'VEC3','sparse':{'count':2,"
-                                     "'indices':{'bufferView':0,'componentType':5121},'values':{'bufferView':1}}}],"
-                                     "'meshes':[{'primitives':[{'attributes':{'POSITION':0}}]}]" ONE_NODE);
+    lx_scene *scene =
+        import_members("'bufferViews':[{'buffer':0,'byteLength':4},{'buffer':0,'byteOffset':4,'byteLength':24}],"
+                       "'accessors':[{'componentType':5126,'count':3,'type':'VEC3','sparse':{'count':2,"
+                       "'indices':{'bufferView':0,'componentType':5121},'values':{'bufferView':1}}}],"
+                       "'meshes':[{'primitives':[{'attributes':{'POSITION':0}}]}]" ONE_NODE);
     assert_vec3(scene->primitives[0].positions[0], 0, 0, 0);
     assert_vec3(scene->primitives[0].positions[1], 3, 0, 0);
     assert_vec3(scene->primitives[0].positions[2], 0, 4, 0);
@@ -182,11 +185,12 @@ static void quantized_positions_keep_their_integers_unless_normalized(void **sta
     (void)state;
     bin_clear();
     BIN_U16(0, 0, 0, 0, 1000, 0, 0, 0, 0, 65535, 0, 0);
-    lx_scene *scene = import_members("'extensionsUsed':['KHR_mesh_quantization'],'extensionsRequired':['KHR_mesh_quantization'],"
-                                     "'bufferViews':[{'buffer':0,'byteLength':24,'byteStride':8}],"
-                                     "'accessors':[{'bufferView':0,'componentType':5123,'count':3,'type':'VEC3'}],"
-                                     "'meshes':[{'primitives':[{'attributes':{'POSITION':0}}]}],"
-                                     "'nodes':[{'mesh':0,'scale':[0.001,0.001,0.001]}]");
+    lx_scene *scene =
+        import_members("'extensionsUsed':['KHR_mesh_quantization'],'extensionsRequired':['KHR_mesh_quantization'],"
+                       "'bufferViews':[{'buffer':0,'byteLength':24,'byteStride':8}],"
+                       "'accessors':[{'bufferView':0,'componentType':5123,'count':3,'type':'VEC3'}],"
+                       "'meshes':[{'primitives':[{'attributes':{'POSITION':0}}]}],"
+                       "'nodes':[{'mesh':0,'scale':[0.001,0.001,0.001]}]");
     assert_vec3(scene->primitives[0].positions[1], 1000, 0, 0);
     assert_near(scene->bounds.high.y, 65.535, 1e-4);
     lx_scene_destroy(scene);
@@ -214,10 +218,11 @@ static void degenerate_triangles_are_counted_in_one_warning(void **state)
     bin_clear();
     BIN_FLOATS(0, 0, 0, 1, 1, 1, 3, 3, 3, 0, 1e-6f, 0);
     BIN_U16(0, 1, 2, 0, 0, 1, 0, 1, 3, 0);
-    lx_scene *scene = import_members("'bufferViews':[{'buffer':0,'byteLength':48},{'buffer':0,'byteOffset':48,'byteLength':18}],"
-                                     "'accessors':[{'bufferView':0,'componentType':5126,'count':4,'type':'VEC3'},"
-                                     "{'bufferView':1,'componentType':5123,'count':9,'type':'SCALAR'}],"
-                                     "'meshes':[{'name':'m','primitives':[{'attributes':{'POSITION':0},'indices':1}]}]" ONE_NODE);
+    lx_scene *scene =
+        import_members("'bufferViews':[{'buffer':0,'byteLength':48},{'buffer':0,'byteOffset':48,'byteLength':18}],"
+                       "'accessors':[{'bufferView':0,'componentType':5126,'count':4,'type':'VEC3'},"
+                       "{'bufferView':1,'componentType':5123,'count':9,'type':'SCALAR'}],"
+                       "'meshes':[{'name':'m','primitives':[{'attributes':{'POSITION':0},'indices':1}]}]" ONE_NODE);
     assert_int_equal(scene->primitives[0].triangle_count, 3);
     assert_logged("warning: mesh 0 'm': 2 degenerate triangles");
     lx_scene_destroy(scene);
@@ -261,12 +266,14 @@ static void vertex_colors_come_in_all_types(void **state)
 // --- Morph targets ---
 
 #define MORPH_DATA                                                                                                     \
-    "'bufferViews':[{'buffer':0,'byteLength':36},{'buffer':0,'byteOffset':36,'byteLength':36},"                       \
-    "{'buffer':0,'byteOffset':72,'byteLength':4},{'buffer':0,'byteOffset':76,'byteLength':12}],"                      \
-    "'accessors':[{'bufferView':0,'componentType':5126,'count':3,'type':'VEC3'},"                                     \
-    "{'bufferView':1,'componentType':5126,'count':3,'type':'VEC3'},"                                                  \
-    "{'componentType':5126,'count':3,'type':'VEC3','sparse':{'count':1,'indices':{'bufferView':2,'componentType':5121},'values':{'bufferView':3}}}]," \
-    "'meshes':[{'name':'face','weights':[0.5,0],'primitives':[{'attributes':{'POSITION':0},'targets':[{'POSITION':1},{'POSITION':2}]}]}]"
+    "'bufferViews':[{'buffer':0,'byteLength':36},{'buffer':0,'byteOffset':36,'byteLength':36},"                        \
+    "{'buffer':0,'byteOffset':72,'byteLength':4},{'buffer':0,'byteOffset':76,'byteLength':12}],"                       \
+    "'accessors':[{'bufferView':0,'componentType':5126,'count':3,'type':'VEC3'},"                                      \
+    "{'bufferView':1,'componentType':5126,'count':3,'type':'VEC3'},"                                                   \
+    "{'componentType':5126,'count':3,'type':'VEC3','sparse':{'count':1,'indices':{'bufferView':2,'componentType':"     \
+    "5121},'values':{'bufferView':3}}}],"                                                                              \
+    "'meshes':[{'name':'face','weights':[0.5,0],'primitives':[{'attributes':{'POSITION':0},'targets':[{'POSITION':1}," \
+    "{'POSITION':2}]}]}]"
 
 static void morph_bin(void)
 {
@@ -290,7 +297,8 @@ static void node_weights_override_mesh_weights(void **state)
 {
     (void)state;
     morph_bin();
-    lx_scene *scene = import_members(MORPH_DATA ",'nodes':[{'mesh':0},{'mesh':0,'weights':[0,1]},{'mesh':0,'weights':[0.5,0]}]");
+    lx_scene *scene =
+        import_members(MORPH_DATA ",'nodes':[{'mesh':0},{'mesh':0,'weights':[0,1]},{'mesh':0,'weights':[0.5,0]}]");
     assert_int_equal(scene->mesh_count, 2); // the third node's weights are the mesh's
     assert_int_equal(scene->instances[0].mesh, scene->instances[2].mesh);
     const lx_mesh *other = &scene->meshes[scene->instances[1].mesh];
@@ -313,9 +321,9 @@ static void wrong_number_of_weights_is_refused(void **state)
 static void transforms_multiply_down_the_hierarchy(void **state)
 {
     (void)state;
-    lx_scene *scene = import_triangle(
-        ",'nodes':[{'translation':[10,0,0],'children':[1]},{'scale':[1,-2,1],'children':[2]},"
-        "{'mesh':0,'matrix':[0,1,0,0, -1,0,0,0, 0,0,1,0, 0,0,5,1]}]");
+    lx_scene *scene =
+        import_triangle(",'nodes':[{'translation':[10,0,0],'children':[1]},{'scale':[1,-2,1],'children':[2]},"
+                        "{'mesh':0,'matrix':[0,1,0,0, -1,0,0,0, 0,0,1,0, 0,0,5,1]}]");
     const lx_mat4 m = scene->instances[0].transform;
     assert_vec3(lx_mat4_point(m, lx_v3(1, 0, 0)), 10, -2, 5);
     assert_true(lx_mat4_determinant3(m) < 0);
@@ -335,11 +343,13 @@ static void rotation_that_is_not_unit_is_normalized(void **state)
 static void only_the_default_scene_is_read(void **state)
 {
     (void)state;
-    lx_scene *scene = import_triangle(",'scene':1,'scenes':[{'nodes':[0]},{'nodes':[1]}],'nodes':[{'mesh':0,'name':'a'},{'mesh':0,'name':'b'}]");
+    lx_scene *scene = import_triangle(
+        ",'scene':1,'scenes':[{'nodes':[0]},{'nodes':[1]}],'nodes':[{'mesh':0,'name':'a'},{'mesh':0,'name':'b'}]");
     assert_int_equal(scene->instance_count, 1);
     assert_string_equal(scene->instances[0].name, "b");
     lx_scene_destroy(scene);
-    scene = import_triangle(",'scenes':[{'nodes':[0]},{'nodes':[1]}],'nodes':[{'mesh':0,'name':'a'},{'mesh':0,'name':'b'}]");
+    scene = import_triangle(
+        ",'scenes':[{'nodes':[0]},{'nodes':[1]}],'nodes':[{'mesh':0,'name':'a'},{'mesh':0,'name':'b'}]");
     assert_int_equal(scene->instance_count, 1);
     assert_string_equal(scene->instances[0].name, "a");
     lx_scene_destroy(scene);
@@ -367,13 +377,15 @@ static void gpu_instances_become_instances(void **state)
     BIN_FLOATS(1, 0, 0, 2, 0, 0);
     const int16_t rotations[] = {0, 0, 0, 32767, 0, 0, 23170, 23170};
     bin_bytes(rotations, sizeof rotations);
-    lx_scene *scene = import_members(
-        "'extensionsUsed':['EXT_mesh_gpu_instancing'],"
-        "'bufferViews':[{'buffer':0,'byteLength':36},{'buffer':0,'byteOffset':36,'byteLength':24},{'buffer':0,'byteOffset':60,'byteLength':16}],"
-        "'accessors':[{'bufferView':0,'componentType':5126,'count':3,'type':'VEC3'},{'bufferView':1,'componentType':5126,'count':2,'type':'VEC3'},"
-        "{'bufferView':2,'componentType':5122,'normalized':true,'count':2,'type':'VEC4'}],"
-        "'meshes':[{'primitives':[{'attributes':{'POSITION':0}}]}],"
-        "'nodes':[{'name':'crowd','mesh':0,'translation':[0,0,7],'extensions':{'EXT_mesh_gpu_instancing':{'attributes':{'TRANSLATION':1,'ROTATION':2}}}}]");
+    lx_scene *scene = import_members("'extensionsUsed':['EXT_mesh_gpu_instancing'],"
+                                     "'bufferViews':[{'buffer':0,'byteLength':36},{'buffer':0,'byteOffset':36,'"
+                                     "byteLength':24},{'buffer':0,'byteOffset':60,'byteLength':16}],"
+                                     "'accessors':[{'bufferView':0,'componentType':5126,'count':3,'type':'VEC3'},{'"
+                                     "bufferView':1,'componentType':5126,'count':2,'type':'VEC3'},"
+                                     "{'bufferView':2,'componentType':5122,'normalized':true,'count':2,'type':'VEC4'}],"
+                                     "'meshes':[{'primitives':[{'attributes':{'POSITION':0}}]}],"
+                                     "'nodes':[{'name':'crowd','mesh':0,'translation':[0,0,7],'extensions':{'EXT_mesh_"
+                                     "gpu_instancing':{'attributes':{'TRANSLATION':1,'ROTATION':2}}}}]");
     assert_int_equal(scene->instance_count, 2);
     assert_int_equal(scene->surface_count, 2);
     assert_int_equal(scene->instances[1].gpu_instance, 1);
@@ -390,34 +402,40 @@ static void what_moves_is_not_static_and_listed_once(void **state)
     lx_scene *scene = import_members(
         "'extensionsUsed':['KHR_lights_punctual'],'extensions':{'KHR_lights_punctual':{'lights':[{'type':'point'}]}},"
         "'bufferViews':[{'buffer':0,'byteLength':36},{'buffer':0,'byteOffset':36,'byteLength':8}],"
-        "'accessors':[{'bufferView':0,'componentType':5126,'count':3,'type':'VEC3'},{'bufferView':1,'componentType':5126,'count':2,'type':'SCALAR'}],"
+        "'accessors':[{'bufferView':0,'componentType':5126,'count':3,'type':'VEC3'},{'bufferView':1,'componentType':"
+        "5126,'count':2,'type':'SCALAR'}],"
         "'materials':[{'emissiveFactor':[1,1,1]}],"
         "'meshes':[{'primitives':[{'attributes':{'POSITION':0},'material':0}]}],'skins':[{'joints':[0]}],"
-        "'animations':[{'samplers':[{'input':1,'output':1}],'channels':[{'sampler':0,'target':{'node':0,'path':'rotation'}},"
+        "'animations':[{'samplers':[{'input':1,'output':1}],'channels':[{'sampler':0,'target':{'node':0,'path':'"
+        "rotation'}},"
         "{'sampler':0,'target':{'node':4,'path':'weights'}}]}],"
         "'nodes':[{'name':'door','children':[1,2]},{'name':'leaf','mesh':0},"
         "{'name':'lamp','extensions':{'KHR_lights_punctual':{'light':0}}},"
         "{'name':'hero','mesh':0,'skin':0},{'name':'face','mesh':0},{'name':'wall','mesh':0}]");
     assert_int_equal(scene->instance_count, 4);
-    for (uint32_t i = 0; i < 4; ++i) assert_int_equal(scene->instances[i].is_static, strcmp(scene->instances[i].name, "wall") == 0);
+    for (uint32_t i = 0; i < 4; ++i)
+        assert_int_equal(scene->instances[i].is_static, strcmp(scene->instances[i].name, "wall") == 0);
     assert_int_equal(scene->source_count, 1); // the wall; the others are realtime
     assert_string_equal(scene->sources[0].name, "wall");
     assert_int_equal(scene->surfaces[0].source, -1);
     assert_int_equal(scene->light_count, 1);
-    assert_logged("note: not static, so not baked: node 1 'leaf' (animated), node 2 'lamp' (animated), node 3 'hero' (skinned), "
-                  "node 4 'face' (animated shape)\n");
+    assert_logged(
+        "note: not static, so not baked: node 1 'leaf' (animated), node 2 'lamp' (animated), node 3 'hero' (skinned), "
+        "node 4 'face' (animated shape)\n");
     lx_scene_destroy(scene);
 }
 
 static void animation_pointers_move_nodes_but_colours_do_not(void **state)
 {
     (void)state;
-    lx_scene *scene = import_triangle(
-        ",'extensionsUsed':['KHR_animation_pointer'],'extensionsRequired':['KHR_animation_pointer'],"
-        "'materials':[{}],'animations':[{'samplers':[{'input':0,'output':0}],'channels':["
-        "{'sampler':0,'target':{'path':'pointer','extensions':{'KHR_animation_pointer':{'pointer':'/nodes/1/translation'}}}},"
-        "{'sampler':0,'target':{'path':'pointer','extensions':{'KHR_animation_pointer':{'pointer':'/materials/0/emissiveFactor'}}}}]}],"
-        "'nodes':[{'mesh':0},{'mesh':0}]");
+    lx_scene *scene =
+        import_triangle(",'extensionsUsed':['KHR_animation_pointer'],'extensionsRequired':['KHR_animation_pointer'],"
+                        "'materials':[{}],'animations':[{'samplers':[{'input':0,'output':0}],'channels':["
+                        "{'sampler':0,'target':{'path':'pointer','extensions':{'KHR_animation_pointer':{'pointer':'/"
+                        "nodes/1/translation'}}}},"
+                        "{'sampler':0,'target':{'path':'pointer','extensions':{'KHR_animation_pointer':{'pointer':'/"
+                        "materials/0/emissiveFactor'}}}}]}],"
+                        "'nodes':[{'mesh':0},{'mesh':0}]");
     assert_true(scene->instances[0].is_static);
     assert_false(scene->instances[1].is_static);
     lx_scene_destroy(scene);
@@ -436,11 +454,12 @@ static lx_scene *import_material(const char *material, const char *more)
 static void material_factors_are_read(void **state)
 {
     (void)state;
-    lx_scene *scene = import_material("{'name':'wood','pbrMetallicRoughness':{'baseColorFactor':[0.1,0.2,0.3,0.4],'metallicFactor':0.5,"
-                                      "'roughnessFactor':0.25},'emissiveFactor':[0.5,0,1],'alphaMode':'MASK','alphaCutoff':0.75,'doubleSided':true,"
-                                      "'extensions':{'KHR_materials_emissive_strength':{'emissiveStrength':20},'KHR_materials_unlit':{},"
-                                      "'KHR_materials_transmission':{'transmissionFactor':0.9}}}",
-                                      "");
+    lx_scene *scene = import_material(
+        "{'name':'wood','pbrMetallicRoughness':{'baseColorFactor':[0.1,0.2,0.3,0.4],'metallicFactor':0.5,"
+        "'roughnessFactor':0.25},'emissiveFactor':[0.5,0,1],'alphaMode':'MASK','alphaCutoff':0.75,'doubleSided':true,"
+        "'extensions':{'KHR_materials_emissive_strength':{'emissiveStrength':20},'KHR_materials_unlit':{},"
+        "'KHR_materials_transmission':{'transmissionFactor':0.9}}}",
+        "");
     const lx_material *m = &scene->materials[0];
     assert_string_equal(m->name, "wood");
     assert_near(m->base_color.g, 0.2, 1e-7);
@@ -460,9 +479,10 @@ static void material_factors_are_read(void **state)
 static void specular_glossiness_gives_its_diffuse(void **state)
 {
     (void)state;
-    lx_scene *scene = import_material("{'pbrMetallicRoughness':{'baseColorFactor':[1,0,0,1]},'extensions':{'KHR_materials_pbrSpecularGlossiness':"
-                                      "{'diffuseFactor':[0,0.5,0,0.25],'glossinessFactor':0.75}}}",
-                                      "");
+    lx_scene *scene = import_material(
+        "{'pbrMetallicRoughness':{'baseColorFactor':[1,0,0,1]},'extensions':{'KHR_materials_pbrSpecularGlossiness':"
+        "{'diffuseFactor':[0,0.5,0,0.25],'glossinessFactor':0.75}}}",
+        "");
     const lx_material *m = &scene->materials[0];
     assert_near(m->base_color.r, 0, 0);
     assert_near(m->base_color.g, 0.5, 0);
@@ -499,7 +519,8 @@ static lx_scene *import_textured(const char *info, const char *sampler, const ch
              "'bufferViews':[{'buffer':0,'byteLength':36},{'buffer':0,'byteOffset':36,'byteLength':%zu}],"
              "'accessors':[{'bufferView':0,'componentType':5126,'count':3,'type':'VEC3'}],"
              "'meshes':[{'primitives':[{'attributes':{'POSITION':0},'material':0}]}],"
-             "'images':[{'bufferView':1,'mimeType':'image/png'},{'bufferView':0,'mimeType':'image/png'}],'samplers':[%s],'textures':[%s],"
+             "'images':[{'bufferView':1,'mimeType':'image/png'},{'bufferView':0,'mimeType':'image/"
+             "png'}],'samplers':[%s],'textures':[%s],"
              "'materials':[{'pbrMetallicRoughness':{'baseColorTexture':%s}}]" ONE_NODE,
              png.size, sampler, texture, info);
     lx_bytes_release(&png);
@@ -509,7 +530,8 @@ static lx_scene *import_textured(const char *info, const char *sampler, const ch
 static void textures_are_sampled_as_the_sampler_says(void **state)
 {
     (void)state;
-    lx_scene *scene = import_textured("{'index':0,'texCoord':1}", "{'wrapS':33071,'wrapT':33648}", "{'source':0,'sampler':0}");
+    lx_scene *scene =
+        import_textured("{'index':0,'texCoord':1}", "{'wrapS':33071,'wrapT':33648}", "{'source':0,'sampler':0}");
     const lx_texture_slot *slot = &scene->materials[0].base_color_texture;
     assert_int_equal(scene->images[0].width, 2);
     assert_int_equal(scene->images[1].width, 0); // not used, so not decoded (it is no image at all)
@@ -546,7 +568,8 @@ static void nearest_and_repeat_are_obeyed(void **state)
 static void texture_lookup_survives_any_coordinate(void **state)
 {
     (void)state;
-    static const float wild[] = {0, -0.0f, 1, 1e-40f, 1e9f, -1e9f, 1e30f, -3.4e38f, INFINITY, -INFINITY, NAN, 16777217.0f};
+    static const float wild[] = {0,     -0.0f,    1,        1e-40f,    1e9f, -1e9f,
+                                 1e30f, -3.4e38f, INFINITY, -INFINITY, NAN,  16777217.0f};
     const size_t count = sizeof wild / sizeof *wild;
     static const char *const samplers[] = {"{}", "{'wrapS':33071,'wrapT':33071}", "{'wrapS':33648,'wrapT':33648}",
                                            "{'magFilter':9728}"};
@@ -556,7 +579,8 @@ static void texture_lookup_survives_any_coordinate(void **state)
             const lx_vec4 c = lx_texture_sample(scene, &scene->materials[0].base_color_texture,
                                                 lx_v2(wild[i % count], wild[i / count]), true);
             const float most = 1.000001f; // weights of bilinear filtering may round up
-            assert_true(c.x >= 0 && c.x <= most && c.y >= 0 && c.y <= most && c.z >= 0 && c.z <= most && c.w > 0 && c.w <= most);
+            assert_true(c.x >= 0 && c.x <= most && c.y >= 0 && c.y <= most && c.z >= 0 && c.z <= most && c.w > 0 &&
+                        c.w <= most);
         }
         lx_scene_destroy(scene);
     }
@@ -572,8 +596,8 @@ static void texture_transform_matches_the_specification(void **state)
     const lx_texture_slot *slot = &scene->materials[0].base_color_texture;
     assert_int_equal(slot->texcoord, 2);
     const float *m = slot->m;
-    assert_near(m[0] * 1 + m[1] * 1 + m[2], 0.5, 1e-6);  // u' = v / 2
-    assert_near(m[3] * 1 + m[4] * 1 + m[5], 0.5, 1e-6);  // v' = 1 - u / 2
+    assert_near(m[0] * 1 + m[1] * 1 + m[2], 0.5, 1e-6); // u' = v / 2
+    assert_near(m[3] * 1 + m[4] * 1 + m[5], 0.5, 1e-6); // v' = 1 - u / 2
     assert_near(m[0] * 1 + m[1] * 0 + m[2], 0, 1e-6);
     assert_near(m[3] * 0 + m[4] * 1 + m[5], 1, 1e-6);
     lx_scene_destroy(scene);
@@ -591,7 +615,8 @@ static void texture_set_beyond_those_read_is_replaced_with_a_warning(void **stat
 static void webp_source_is_preferred(void **state)
 {
     (void)state;
-    lx_scene *scene = import_textured("{'index':0}", "{}", "{'source':1,'extensions':{'EXT_texture_webp':{'source':0}}}");
+    lx_scene *scene =
+        import_textured("{'index':0}", "{}", "{'source':1,'extensions':{'EXT_texture_webp':{'source':0}}}");
     assert_int_equal(scene->textures[0].image, 0);
     lx_scene_destroy(scene);
 }
@@ -628,16 +653,21 @@ static void meshopt_views_are_decoded_and_filtered(void **state)
     snprintf(buffer, sizeof buffer, "{'byteLength':%zu,'uri':'data:;base64,", fixture_bin_size);
     append_base64(buffer, fixture_bin, fixture_bin_size);
     bin_clear();
-    snprintf(members, sizeof members,
-             "'buffers':[%s'},{'byteLength':64,'extensions':{'EXT_meshopt_compression':{'fallback':true}}}],"
-             "'extensionsUsed':['EXT_meshopt_compression'],'extensionsRequired':['EXT_meshopt_compression'],'bufferViews':["
-             "{'buffer':1,'byteLength':36,'extensions':{'EXT_meshopt_compression':{'buffer':0,'byteOffset':%zu,'byteLength':%zu,'byteStride':12,'count':3,'mode':'ATTRIBUTES'}}},"
-             "{'buffer':1,'byteOffset':36,'byteLength':6,'extensions':{'EXT_meshopt_compression':{'buffer':0,'byteOffset':%zu,'byteLength':%zu,'byteStride':2,'count':3,'mode':'TRIANGLES'}}},"
-             "{'buffer':1,'byteOffset':44,'byteLength':12,'byteStride':4,'extensions':{'EXT_meshopt_compression':{'buffer':0,'byteOffset':%zu,'byteLength':%zu,'byteStride':4,'count':3,'mode':'ATTRIBUTES','filter':'OCTAHEDRAL'}}}],"
-             "'accessors':[{'bufferView':0,'componentType':5126,'count':3,'type':'VEC3'},{'bufferView':1,'componentType':5123,'count':3,'type':'SCALAR'},"
-             "{'bufferView':2,'componentType':5120,'normalized':true,'count':3,'type':'VEC3'}],"
-             "'meshes':[{'primitives':[{'attributes':{'POSITION':0,'NORMAL':2},'indices':1}]}]" ONE_NODE,
-             buffer, at[0], sizes[0], at[1], sizes[1], at[2], sizes[2]);
+    snprintf(
+        members, sizeof members,
+        "'buffers':[%s'},{'byteLength':64,'extensions':{'EXT_meshopt_compression':{'fallback':true}}}],"
+        "'extensionsUsed':['EXT_meshopt_compression'],'extensionsRequired':['EXT_meshopt_compression'],'bufferViews':["
+        "{'buffer':1,'byteLength':36,'extensions':{'EXT_meshopt_compression':{'buffer':0,'byteOffset':%zu,'byteLength':"
+        "%zu,'byteStride':12,'count':3,'mode':'ATTRIBUTES'}}},"
+        "{'buffer':1,'byteOffset':36,'byteLength':6,'extensions':{'EXT_meshopt_compression':{'buffer':0,'byteOffset':%"
+        "zu,'byteLength':%zu,'byteStride':2,'count':3,'mode':'TRIANGLES'}}},"
+        "{'buffer':1,'byteOffset':44,'byteLength':12,'byteStride':4,'extensions':{'EXT_meshopt_compression':{'buffer':"
+        "0,'byteOffset':%zu,'byteLength':%zu,'byteStride':4,'count':3,'mode':'ATTRIBUTES','filter':'OCTAHEDRAL'}}}],"
+        "'accessors':[{'bufferView':0,'componentType':5126,'count':3,'type':'VEC3'},{'bufferView':1,'componentType':"
+        "5123,'count':3,'type':'SCALAR'},"
+        "{'bufferView':2,'componentType':5120,'normalized':true,'count':3,'type':'VEC3'}],"
+        "'meshes':[{'primitives':[{'attributes':{'POSITION':0,'NORMAL':2},'indices':1}]}]" ONE_NODE,
+        buffer, at[0], sizes[0], at[1], sizes[1], at[2], sizes[2]);
     lx_scene *scene = import_members(members);
     assert_memory_equal(scene->primitives[0].positions, positions, sizeof positions);
     assert_int_equal(scene->primitives[0].triangle_count, 1);
@@ -651,11 +681,12 @@ static void meshopt_views_are_decoded_and_filtered(void **state)
 static void cameras_lose_their_scale(void **state)
 {
     (void)state;
-    lx_scene *scene = import_triangle(
-        ",'cameras':[{'type':'perspective','perspective':{'yfov':0.8,'aspectRatio':1.5,'znear':0.1}},"
-        "{'name':'map','type':'orthographic','orthographic':{'xmag':4,'ymag':2,'znear':0,'zfar':1}},"
-        "{'type':'perspective','perspective':{'yfov':-1,'znear':0.1}}],"
-        "'nodes':[{'mesh':0},{'name':'eye','camera':0,'translation':[1,2,3],'scale':[5,6,7]},{'camera':1},{'camera':2}]");
+    lx_scene *scene =
+        import_triangle(",'cameras':[{'type':'perspective','perspective':{'yfov':0.8,'aspectRatio':1.5,'znear':0.1}},"
+                        "{'name':'map','type':'orthographic','orthographic':{'xmag':4,'ymag':2,'znear':0,'zfar':1}},"
+                        "{'type':'perspective','perspective':{'yfov':-1,'znear':0.1}}],"
+                        "'nodes':[{'mesh':0},{'name':'eye','camera':0,'translation':[1,2,3],'scale':[5,6,7]},{'camera':"
+                        "1},{'camera':2}]");
     assert_int_equal(scene->camera_count, 2);
     assert_string_equal(scene->cameras[0].name, "eye");
     assert_string_equal(scene->cameras[1].name, "map");

@@ -1,7 +1,8 @@
 // Lights, area lights, sources and their names, authoring keys and who inherits them, and advice.
 #include "unit/scene_fixture.h"
 
-#define LIGHTS(list) ",'extensionsUsed':['KHR_lights_punctual'],'extensions':{'KHR_lights_punctual':{'lights':[" list "]}}"
+#define LIGHTS(list)                                                                                                   \
+    ",'extensionsUsed':['KHR_lights_punctual'],'extensions':{'KHR_lights_punctual':{'lights':[" list "]}}"
 #define LAMP(index) "'extensions':{'KHR_lights_punctual':{'light':" #index "}}"
 
 // --- KHR_lights_punctual ---
@@ -9,11 +10,14 @@
 static void lights_are_placed_by_their_nodes(void **state)
 {
     (void)state;
-    lx_scene *scene = import_triangle(
-        LIGHTS("{'type':'point','intensity':40,'color':[1,0.5,0.25],'range':8},"
-               "{'type':'spot','intensity':5,'spot':{'innerConeAngle':0.2,'outerConeAngle':0.6}},{'type':'directional','intensity':3}")
-        ",'nodes':[{'mesh':0},{'name':'bulb'," LAMP(0) ",'translation':[1,2,3],'scale':[9,9,9]},"
-        "{'name':'sun'," LAMP(2) ",'rotation':[-0.70710678,0,0,0.70710678],'scale':[2,3,-4]},{'name':'stage'," LAMP(1) "}]");
+    lx_scene *scene = import_triangle(LIGHTS(
+        "{'type':'point','intensity':40,'color':[1,0.5,0.25],'range':8},"
+        "{'type':'spot','intensity':5,'spot':{'innerConeAngle':0.2,'outerConeAngle':0.6}},{'type':'directional','"
+        "intensity':3}") ",'nodes':[{'mesh':0},{'name':'bulb'," LAMP(0) ",'translation':[1,2,3],'scale':[9,9,9]},"
+                                                                        "{'name':'sun'," LAMP(
+                                                                            2) ",'rotation':[-0.70710678,0,0,0."
+                                                                               "70710678],'scale':[2,3,-4]},{'name':'"
+                                                                               "stage'," LAMP(1) "}]");
     assert_int_equal(scene->light_count, 3);
     const lx_light *bulb = &scene->lights[0], *sun = &scene->lights[1], *stage = &scene->lights[2];
     assert_int_equal(bulb->kind, LX_LIGHT_POINT);
@@ -51,7 +55,8 @@ static void light_with_defaults_is_white_and_one(void **state)
 static void negative_intensity_is_zero_with_a_warning(void **state)
 {
     (void)state;
-    lx_scene *scene = import_triangle(LIGHTS("{'name':'L','type':'point','intensity':-3}") ",'nodes':[{'mesh':0},{" LAMP(0) "}]");
+    lx_scene *scene =
+        import_triangle(LIGHTS("{'name':'L','type':'point','intensity':-3}") ",'nodes':[{'mesh':0},{" LAMP(0) "}]");
     assert_near(scene->lights[0].intensity, 0, 0);
     assert_int_equal(scene->source_count, 1); // zero intensity is baked too
     assert_string_equal(scene->sources[0].name, "L");
@@ -65,7 +70,8 @@ static void wrong_lights_are_refused(void **state)
     static const struct {
         const char *light, *start;
     } cases[] = {
-        {"{'name':'s','type':'spot','spot':{'innerConeAngle':0.6,'outerConeAngle':0.6}}", "light 0 's': innerConeAngle 0.6 is not from 0 to below outerConeAngle 0.6"},
+        {"{'name':'s','type':'spot','spot':{'innerConeAngle':0.6,'outerConeAngle':0.6}}",
+         "light 0 's': innerConeAngle 0.6 is not from 0 to below outerConeAngle 0.6"},
         {"{'type':'spot','spot':{'innerConeAngle':-0.1}}", "light 0: innerConeAngle -0.1"},
         {"{'type':'spot','spot':{'outerConeAngle':1.7}}", "light 0: outerConeAngle 1.7 is more than pi/2"},
         {"{'type':'point','range':-1}", "light 0: range -1 is negative"},
@@ -78,14 +84,15 @@ static void wrong_lights_are_refused(void **state)
         snprintf(more, sizeof more, LIGHTS("%s") ",'nodes':[{'mesh':0},{" LAMP(0) "}]", cases[i].light);
         assert_triangle_refused(more, LX_ERROR_FORMAT, cases[i].start);
     }
-    assert_triangle_refused(LIGHTS("{'type':'point'}") ",'nodes':[{'mesh':0},{'name':'n'," LAMP(4) "}]", LX_ERROR_FORMAT,
-                            "node 1 'n' KHR_lights_punctual: light 4 out of range (count 1)");
+    assert_triangle_refused(LIGHTS("{'type':'point'}") ",'nodes':[{'mesh':0},{'name':'n'," LAMP(4) "}]",
+                            LX_ERROR_FORMAT, "node 1 'n' KHR_lights_punctual: light 4 out of range (count 1)");
 }
 
 static void right_angle_with_rounding_is_accepted(void **state)
 {
     (void)state;
-    lx_scene *scene = import_triangle(LIGHTS("{'type':'spot','spot':{'outerConeAngle':1.57082}}") ",'nodes':[{'mesh':0},{" LAMP(0) "}]");
+    lx_scene *scene = import_triangle(
+        LIGHTS("{'type':'spot','spot':{'outerConeAngle':1.57082}}") ",'nodes':[{'mesh':0},{" LAMP(0) "}]");
     assert_near(scene->lights[0].outer_angle, LX_PI / 2, 0);
     lx_scene_destroy(scene);
 }
@@ -93,9 +100,10 @@ static void right_angle_with_rounding_is_accepted(void **state)
 static void lights_in_vpl_and_blocker_groups_are_no_lamps(void **state)
 {
     (void)state;
-    lx_scene *scene = import_triangle(LIGHTS("{'type':'point'}")
-        ",'nodes':[{'mesh':0},{'name':'VPLS.hall','children':[2]},{'children':[3]},{" LAMP(0) "},{'name':'BLOCKERS','children':[5]},{" LAMP(0) "},"
-        "{'name':'lamp of VPLS'," LAMP(0) "}]");
+    lx_scene *scene = import_triangle(
+        LIGHTS("{'type':'point'}") ",'nodes':[{'mesh':0},{'name':'VPLS.hall','children':[2]},{'children':[3]},{" LAMP(
+            0) "},{'name':'BLOCKERS','children':[5]},{" LAMP(0) "},"
+                                                                "{'name':'lamp of VPLS'," LAMP(0) "}]");
     assert_int_equal(scene->light_count, 1);
     assert_string_equal(scene->lights[0].name, "lamp of VPLS");
     lx_scene_destroy(scene);
@@ -106,8 +114,10 @@ static void lights_in_vpl_and_blocker_groups_are_no_lamps(void **state)
 static void radius_is_metres_or_degrees(void **state)
 {
     (void)state;
-    lx_scene *scene = import_triangle(LIGHTS("{'type':'point','extras':{'luxel_radius':0.3}},{'type':'directional'}")
-        ",'nodes':[{'mesh':0},{" LAMP(0) ",'scale':[4,4,4]},{" LAMP(1) ",'extras':{'luxel_radius':0.53}},{" LAMP(0) ",'extras':{'luxel_radius':'0.1'}}]");
+    lx_scene *scene = import_triangle(
+        LIGHTS("{'type':'point','extras':{'luxel_radius':0.3}},{'type':'directional'}") ",'nodes':[{'mesh':0},{" LAMP(
+            0) ",'scale':[4,4,4]},{" LAMP(1) ",'extras':{'luxel_radius':0.53}},{" LAMP(0) ",'extras':{'luxel_radius':'"
+                                                                                          "0.1'}}]");
     assert_near(scene->lights[0].radius, 0.3, 1e-7);
     assert_near(scene->lights[1].radius, 0.53 * 3.14159265 / 180, 1e-8);
     assert_near(scene->lights[2].radius, 0.1, 1e-7); // the node's goes before the light's
@@ -117,8 +127,9 @@ static void radius_is_metres_or_degrees(void **state)
 static void rect_light_takes_radiance_from_on_axis_intensity(void **state)
 {
     (void)state;
-    lx_scene *scene = import_triangle(LIGHTS("{'type':'spot','intensity':60,'range':5}")
-        ",'nodes':[{'mesh':0},{'name':'panel'," LAMP(0) ",'extras':{'luxel_area':'rect 2 0.5'},'scale':[3,2,1]}]");
+    lx_scene *scene =
+        import_triangle(LIGHTS("{'type':'spot','intensity':60,'range':5}") ",'nodes':[{'mesh':0},{'name':'panel'," LAMP(
+            0) ",'extras':{'luxel_area':'rect 2 0.5'},'scale':[3,2,1]}]");
     const lx_light *light = &scene->lights[0];
     assert_int_equal(light->kind, LX_LIGHT_RECT);
     assert_vec3(light->axis_x, 3, 0, 0); // half of 2 m, three times as wide
@@ -134,9 +145,10 @@ static void rect_light_takes_radiance_from_on_axis_intensity(void **state)
 static void area_light_without_lamp_has_its_own_colour(void **state)
 {
     (void)state;
-    lx_scene *scene = import_triangle(",'nodes':[{'mesh':0},"
-        "{'name':'a','extras':{'luxel_area':'disk 0.5','luxel_color':'#ff8000','luxel_intensity':200}},"
-        "{'name':'b','extras':{'luxel_area':'rect 1 1','luxel_color':[0.5,2,0]}}]");
+    lx_scene *scene =
+        import_triangle(",'nodes':[{'mesh':0},"
+                        "{'name':'a','extras':{'luxel_area':'disk 0.5','luxel_color':'#ff8000','luxel_intensity':200}},"
+                        "{'name':'b','extras':{'luxel_area':'rect 1 1','luxel_color':[0.5,2,0]}}]");
     assert_int_equal(scene->source_count, 2);
     const lx_light *disk = &scene->lights[0];
     assert_int_equal(disk->kind, LX_LIGHT_DISK);
@@ -152,7 +164,8 @@ static void area_light_without_lamp_has_its_own_colour(void **state)
 static void sheared_disk_keeps_its_area_and_perpendicular_axes(void **state)
 {
     (void)state;
-    lx_scene *scene = import_triangle(",'nodes':[{'mesh':0},{'matrix':[2,0,0,0, 1,1,0,0, 0,0,1,0, 0,0,0,1],'extras':{'luxel_area':'disk 1'}}]");
+    lx_scene *scene = import_triangle(
+        ",'nodes':[{'mesh':0},{'matrix':[2,0,0,0, 1,1,0,0, 0,0,1,0, 0,0,0,1],'extras':{'luxel_area':'disk 1'}}]");
     const lx_light *light = &scene->lights[0];
     assert_near(lx_dot(light->axis_x, light->axis_y), 0, 1e-5);
     assert_near(lx_length(lx_cross(light->axis_x, light->axis_y)), 2, 1e-5);
@@ -170,8 +183,9 @@ static void mirrored_area_light_still_faces_minus_z(void **state)
 static void area_on_a_parent_shapes_the_lamp_below(void **state)
 {
     (void)state;
-    lx_scene *scene = import_triangle(LIGHTS("{'type':'point','intensity':8}")
-        ",'nodes':[{'mesh':0},{'name':'Area','extras':{'luxel_area':'rect 2 2'},'children':[2]},{'name':'Area_Orientation'," LAMP(0) "}]");
+    lx_scene *scene = import_triangle(
+        LIGHTS("{'type':'point','intensity':8}") ",'nodes':[{'mesh':0},{'name':'Area','extras':{'luxel_area':'rect 2 "
+                                                 "2'},'children':[2]},{'name':'Area_Orientation'," LAMP(0) "}]");
     assert_int_equal(scene->light_count, 1);
     assert_int_equal(scene->lights[0].kind, LX_LIGHT_RECT);
     assert_near(scene->lights[0].intensity, 2, 1e-6);
@@ -181,9 +195,15 @@ static void area_on_a_parent_shapes_the_lamp_below(void **state)
 static void area_that_makes_no_sense_is_ignored_with_a_warning(void **state)
 {
     (void)state;
-    lx_scene *scene = import_triangle(LIGHTS("{'type':'directional'},{'type':'point','intensity':7}")
-        ",'nodes':[{'mesh':0},{" LAMP(0) ",'extras':{'luxel_area':'rect 1 1'}},{'name':'flat'," LAMP(1) ",'scale':[0,1,1],'extras':{'luxel_area':'rect 1 1'}},"
-        "{" LAMP(1) ",'extras':{'luxel_area':'rect 1'}},{'name':'nothing','scale':[0,1,1],'extras':{'luxel_area':'disk 1'}}]");
+    lx_scene *scene =
+        import_triangle(LIGHTS("{'type':'directional'},{'type':'point','intensity':7}") ",'nodes':[{'mesh':0},{" LAMP(
+            0) ",'extras':{'luxel_area':'rect 1 1'}},{'name':'flat'," LAMP(1) ",'scale':[0,1,1],'extras':{'luxel_area':"
+                                                                              "'rect 1 1'}},"
+                                                                              "{" LAMP(
+                                                                                  1) ",'extras':{'luxel_area':'rect "
+                                                                                     "1'}},{'name':'nothing','scale':["
+                                                                                     "0,1,1],'extras':{'luxel_area':'"
+                                                                                     "disk 1'}}]");
     assert_int_equal(scene->light_count, 3);
     assert_int_equal(scene->lights[0].kind, LX_LIGHT_DIRECTIONAL);
     assert_int_equal(scene->lights[1].kind, LX_LIGHT_POINT);
@@ -200,19 +220,24 @@ static void area_that_makes_no_sense_is_ignored_with_a_warning(void **state)
 
 // Three triangles: materials 0, 1 and none; 0 and 1 emit.
 #define EMITTERS                                                                                                       \
-    TRIANGLE_DATA ",'materials':[{'name':'neon','emissiveFactor':[1,0,0]},{'emissiveFactor':[0,0.5,0],"                 \
-                  "'extensions':{'KHR_materials_emissive_strength':{'emissiveStrength':12}}},{'name':'dark','emissiveFactor':[0,0,0]},"  \
-                  "{'name':'off','emissiveFactor':[1,1,1],'extensions':{'KHR_materials_emissive_strength':{'emissiveStrength':0}}}],"  \
-                  "'meshes':[{'name':'sign','primitives':[{'attributes':{'POSITION':0},'material':0},{'attributes':{'POSITION':0},'material':1},"  \
-                  "{'attributes':{'POSITION':0}},{'attributes':{'POSITION':0},'material':0}]},"                        \
-                  "{'primitives':[{'attributes':{'POSITION':0},'material':0}]},"                                        \
-                  "{'primitives':[{'attributes':{'POSITION':0},'material':2},{'attributes':{'POSITION':0},'material':3}]}]"
+    TRIANGLE_DATA                                                                                                      \
+        ",'materials':[{'name':'neon','emissiveFactor':[1,0,0]},{'emissiveFactor':[0,0.5,0],"                          \
+        "'extensions':{'KHR_materials_emissive_strength':{'emissiveStrength':12}}},{'name':'dark','emissiveFactor':["  \
+        "0,0,0]},"                                                                                                     \
+        "{'name':'off','emissiveFactor':[1,1,1],'extensions':{'KHR_materials_emissive_strength':{'emissiveStrength':"  \
+        "0}}}],"                                                                                                       \
+        "'meshes':[{'name':'sign','primitives':[{'attributes':{'POSITION':0},'material':0},{'attributes':{'POSITION':" \
+        "0},'material':1},"                                                                                            \
+        "{'attributes':{'POSITION':0}},{'attributes':{'POSITION':0},'material':0}]},"                                  \
+        "{'primitives':[{'attributes':{'POSITION':0},'material':0}]},"                                                 \
+        "{'primitives':[{'attributes':{'POSITION':0},'material':2},{'attributes':{'POSITION':0},'material':3}]}]"
 
 static void emitters_are_named_by_node_and_material(void **state)
 {
     (void)state;
     triangle_bin();
-    lx_scene *scene = import_members(EMITTERS ",'nodes':[{'name':'board','mesh':0},{'name':'tube','mesh':1},{'mesh':1},{'name':'dead','mesh':2}]");
+    lx_scene *scene = import_members(
+        EMITTERS ",'nodes':[{'name':'board','mesh':0},{'name':'tube','mesh':1},{'mesh':1},{'name':'dead','mesh':2}]");
     assert_int_equal(scene->source_count, 4);
     assert_string_equal(scene->sources[0].name, "board/neon");
     assert_string_equal(scene->sources[1].name, "board/material_1");
@@ -234,8 +259,8 @@ static void emitters_are_named_by_node_and_material(void **state)
 static void repeated_names_get_numbers(void **state)
 {
     (void)state;
-    lx_scene *scene = import_triangle(LIGHTS("{'type':'point'}")
-        ",'nodes':[{'mesh':0},{'name':'lamp'," LAMP(0) "},{'name':'lamp#2'," LAMP(0) "},{'name':'lamp'," LAMP(0) "},{'name':'lamp'," LAMP(0) "},{" LAMP(0) "}]");
+    lx_scene *scene = import_triangle(LIGHTS("{'type':'point'}") ",'nodes':[{'mesh':0},{'name':'lamp'," LAMP(
+        0) "},{'name':'lamp#2'," LAMP(0) "},{'name':'lamp'," LAMP(0) "},{'name':'lamp'," LAMP(0) "},{" LAMP(0) "}]");
     static const char *const expected[] = {"lamp", "lamp#2", "lamp#3", "lamp#4", "light_4"};
     assert_int_equal(scene->source_count, 5);
     for (int i = 0; i < 5; ++i) assert_string_equal(scene->sources[i].name, expected[i]);
@@ -248,8 +273,9 @@ static void gpu_instances_of_an_emitter_are_one_source(void **state)
 {
     (void)state;
     triangle_bin();
-    lx_scene *scene = import_members(EMITTERS ",'extensionsUsed':['EXT_mesh_gpu_instancing'],'nodes':[{'name':'tubes','mesh':1,"
-                                              "'extensions':{'EXT_mesh_gpu_instancing':{'attributes':{'TRANSLATION':0}}}}]");
+    lx_scene *scene =
+        import_members(EMITTERS ",'extensionsUsed':['EXT_mesh_gpu_instancing'],'nodes':[{'name':'tubes','mesh':1,"
+                                "'extensions':{'EXT_mesh_gpu_instancing':{'attributes':{'TRANSLATION':0}}}}]");
     assert_int_equal(scene->instance_count, 3);
     assert_int_equal(scene->source_count, 1);
     for (int i = 0; i < 3; ++i) assert_int_equal(scene->surfaces[i].source, 0);
@@ -261,10 +287,42 @@ static void gpu_instances_of_an_emitter_are_one_source(void **state)
 static void keys_are_inherited_and_the_nearest_wins(void **state)
 {
     (void)state;
-    lx_scene *scene = import_triangle(LIGHTS("{'type':'point','extras':{'luxel_layer':'light','luxel_mode':'mixed'}}")
-        ",'nodes':[{'name':'hall','extras':{'luxel_layer':'hall','luxel_density':2},'children':[1,2,3]},"
-        "{'name':'a'," LAMP(0) "},{'name':'b'," LAMP(0) ",'extras':{'luxel_layer':'b','luxel_mode':'baked'}},"
-        "{'children':[4]},{'name':'m','mesh':0,'extras':{'luxel_scale_in_lightmap':0.5}},{'name':'c'," LAMP(0) "},{'mesh':0}]");
+    lx_scene *scene = import_triangle(LIGHTS(
+        "{'type':'point','extras':{'luxel_layer':'light','luxel_mode':'mixed'}}") ",'nodes':[{'name':'hall','extras':{'"
+                                                                                  "luxel_layer':'hall','luxel_density':"
+                                                                                  "2},'children':[1,2,3]},"
+                                                                                  "{'name':'a'," LAMP(0) "},{'name':'b'"
+                                                                                                         "," LAMP(
+                                                                                                             0) ",'"
+                                                                                                                "extras"
+                                                                                                                "':{'"
+                                                                                                                "luxel_"
+                                                                                                                "layer'"
+                                                                                                                ":'b','"
+                                                                                                                "luxel_"
+                                                                                                                "mode':"
+                                                                                                                "'baked"
+                                                                                                                "'}},"
+                                                                                                                "{'"
+                                                                                                                "childr"
+                                                                                                                "en':["
+                                                                                                                "4]},{'"
+                                                                                                                "name':"
+                                                                                                                "'m','"
+                                                                                                                "mesh':"
+                                                                                                                "0,'"
+                                                                                                                "extras"
+                                                                                                                "':{'"
+                                                                                                                "luxel_"
+                                                                                                                "scale_"
+                                                                                                                "in_"
+                                                                                                                "lightm"
+                                                                                                                "ap':0."
+                                                                                                                "5}},{'"
+                                                                                                                "name':"
+                                                                                                                "'c'"
+                                                                                                                "," LAMP(
+                                                                                                                    0) "},{'mesh':0}]");
     assert_string_equal(source_named(scene, "a")->layer, "hall"); // node goes before light
     assert_int_equal(source_named(scene, "a")->mode, LX_MODE_MIXED);
     assert_int_equal(source_named(scene, "a")->parent_node, 0);
@@ -281,9 +339,11 @@ static void material_keys_apply_where_nodes_say_nothing(void **state)
 {
     (void)state;
     triangle_bin();
-    lx_scene *scene = import_members(TRIANGLE_MATERIAL
-        ",'materials':[{'emissiveFactor':[1,1,1],'extras':{'luxel_layer':'neons','luxel_transparent':1,'luxel_density':3,'luxel_mode':'mixed'}}],"
-        "'nodes':[{'name':'a','mesh':0},{'name':'b','mesh':0,'extras':{'luxel_layer':'mine','luxel_transparent':'false','luxel_mode':'realtime'}}]");
+    lx_scene *scene =
+        import_members(TRIANGLE_MATERIAL ",'materials':[{'emissiveFactor':[1,1,1],'extras':{'luxel_layer':'neons','"
+                                         "luxel_transparent':1,'luxel_density':3,'luxel_mode':'mixed'}}],"
+                                         "'nodes':[{'name':'a','mesh':0},{'name':'b','mesh':0,'extras':{'luxel_layer':'"
+                                         "mine','luxel_transparent':'false','luxel_mode':'realtime'}}]");
     assert_int_equal(scene->source_count, 1);
     assert_string_equal(scene->sources[0].layer, "neons");
     assert_int_equal(scene->sources[0].mode, LX_MODE_MIXED);
@@ -298,9 +358,11 @@ static void material_keys_apply_where_nodes_say_nothing(void **state)
 static void booleans_come_as_numbers_and_texts(void **state)
 {
     (void)state;
-    lx_scene *scene = import_triangle(",'nodes':[{'mesh':0,'extras':{'luxel_static':0}},{'mesh':0,'extras':{'luxel_static':'false'}},"
-        "{'mesh':0,'extras':{'luxel_static':false}},{'mesh':0,'extras':{'luxel_static':1.0}},{'mesh':0,'extras':{'luxel_static':'true'}},"
-        "{'mesh':0,'extras':{'luxel_static':'perhaps'}}]");
+    lx_scene *scene =
+        import_triangle(",'nodes':[{'mesh':0,'extras':{'luxel_static':0}},{'mesh':0,'extras':{'luxel_static':'false'}},"
+                        "{'mesh':0,'extras':{'luxel_static':false}},{'mesh':0,'extras':{'luxel_static':1.0}},{'mesh':0,"
+                        "'extras':{'luxel_static':'true'}},"
+                        "{'mesh':0,'extras':{'luxel_static':'perhaps'}}]");
     for (uint32_t i = 0; i < 6; ++i) assert_int_equal(scene->instances[i].is_static, i >= 3);
     assert_logged("warning: node 5: luxel_static is not true or false; ignored");
     assert_int_equal(scene->triangle_count, 3);
@@ -310,9 +372,11 @@ static void booleans_come_as_numbers_and_texts(void **state)
 static void lamps_of_what_is_not_static_are_realtime(void **state)
 {
     (void)state;
-    lx_scene *scene = import_triangle(LIGHTS("{'type':'point'}")
-        ",'nodes':[{'mesh':0},{'extras':{'luxel_static':false},'children':[2,3]},{'name':'torch'," LAMP(0) "},"
-        "{'name':'fixed'," LAMP(0) ",'extras':{'luxel_mode':'baked'}},{" LAMP(0) ",'extras':{'luxel_mode':'realtime'}}]");
+    lx_scene *scene = import_triangle(LIGHTS(
+        "{'type':'point'}") ",'nodes':[{'mesh':0},{'extras':{'luxel_static':false},'children':[2,3]},{'name':'torch'"
+                            "," LAMP(0) "},"
+                                        "{'name':'fixed'," LAMP(0) ",'extras':{'luxel_mode':'baked'}},{" LAMP(
+                                            0) ",'extras':{'luxel_mode':'realtime'}}]");
     assert_int_equal(scene->light_count, 3);
     assert_int_equal(scene->source_count, 1);
     assert_string_equal(scene->sources[0].name, "fixed");
@@ -322,7 +386,8 @@ static void lamps_of_what_is_not_static_are_realtime(void **state)
 static void unknown_key_is_told_with_the_nearest_one(void **state)
 {
     (void)state;
-    lx_scene_destroy(import_triangle(",'nodes':[{'name':'wall','mesh':0,'extras':{'luxel_densty':2,'other':1,'luxel_monitor':'4x3','luxel_probes':'points'}}]"));
+    lx_scene_destroy(import_triangle(",'nodes':[{'name':'wall','mesh':0,'extras':{'luxel_densty':2,'other':1,'luxel_"
+                                     "monitor':'4x3','luxel_probes':'points'}}]"));
     assert_logged("warning: node 0 'wall': unknown key luxel_densty; did you mean luxel_density?");
     assert_not_logged("other");
     assert_not_logged("monitor");
@@ -333,7 +398,8 @@ static void key_in_the_wrong_place_gets_a_warning(void **state)
 {
     (void)state;
     triangle_bin();
-    lx_scene_destroy(import_members(TRIANGLE_DATA ",'meshes':[{'name':'m','primitives':[{'attributes':{'POSITION':0},'material':0}],'extras':{'luxel_layer':'x'}}],"
+    lx_scene_destroy(import_members(TRIANGLE_DATA ",'meshes':[{'name':'m','primitives':[{'attributes':{'POSITION':0},'"
+                                                  "material':0}],'extras':{'luxel_layer':'x'}}],"
                                                   "'materials':[{'extras':{'luxel_static':false}}]" ONE_NODE));
     assert_logged("warning: mesh 0 'm': luxel_layer has no effect here; it belongs to a node or material");
     assert_logged("warning: material 0: luxel_static has no effect here; it belongs to a node");
@@ -342,13 +408,18 @@ static void key_in_the_wrong_place_gets_a_warning(void **state)
 static void values_of_the_wrong_kind_are_ignored_with_a_warning(void **state)
 {
     (void)state;
-    lx_scene *scene = import_triangle(LIGHTS("{'type':'point'}") ",'nodes':[{'mesh':0,'extras':{'luxel_density':-1}},"
-        "{" LAMP(0) ",'extras':{'luxel_radius':'wide','luxel_mode':'live','luxel_layer':7,'luxel_color':'#12345','luxel_intensity':[1]}}]");
+    lx_scene *scene = import_triangle(
+        LIGHTS("{'type':'point'}") ",'nodes':[{'mesh':0,'extras':{'luxel_density':-1}},"
+                                   "{" LAMP(0) ",'extras':{'luxel_radius':'wide','luxel_mode':'live','luxel_layer':7,'"
+                                               "luxel_color':'#12345','luxel_intensity':[1]}}]");
     assert_near(scene->instances[0].density, 1, 0);
     assert_null(scene->sources[0].layer);
-    static const char *const expected[] = {"node 0: luxel_density is not a number above 0", "luxel_radius is not a number of at least 0",
-                                           "luxel_mode is not 'baked', 'mixed' or 'realtime'", "luxel_layer is not a name",
-                                           "luxel_color is not '#rrggbb'", "luxel_intensity is not a number"};
+    static const char *const expected[] = {"node 0: luxel_density is not a number above 0",
+                                           "luxel_radius is not a number of at least 0",
+                                           "luxel_mode is not 'baked', 'mixed' or 'realtime'",
+                                           "luxel_layer is not a name",
+                                           "luxel_color is not '#rrggbb'",
+                                           "luxel_intensity is not a number"};
     for (int i = 0; i < 6; ++i) assert_logged(expected[i]);
     lx_scene_destroy(scene);
 }
@@ -360,8 +431,11 @@ static lx_scene *import_lamp_and_emitter(const char *strength, lx_light_units un
     char members[2048];
     triangle_bin();
     snprintf(members, sizeof members,
-             TRIANGLE_MATERIAL LIGHTS("{'type':'point','intensity':100}") ",'materials':[{'emissiveFactor':[1,1,1],'extensions':"
-             "{'KHR_materials_emissive_strength':{'emissiveStrength':%s}}}],'nodes':[{'mesh':0},{" LAMP(0) "}]", strength);
+             TRIANGLE_MATERIAL LIGHTS(
+                 "{'type':'point','intensity':100}") ",'materials':[{'emissiveFactor':[1,1,1],'extensions':"
+                                                     "{'KHR_materials_emissive_strength':{'emissiveStrength':%s}}}],'"
+                                                     "nodes':[{'mesh':0},{" LAMP(0) "}]",
+             strength);
     char *text = make_gltf(members);
     lx_scene_load_desc desc = lx_scene_load_desc_default();
     desc.light_units = units;
@@ -405,7 +479,8 @@ static void import_from_blender(const char *more)
     char *asset = strstr(text, "\"2.0\"");
     assert_non_null(asset);
     char whole[8192];
-    snprintf(whole, sizeof whole, "%.*s\"2.0\",\"generator\":\"Khronos glTF Blender I/O v4.3.47\"%s", (int)(asset - text), text, asset + 5);
+    snprintf(whole, sizeof whole, "%.*s\"2.0\",\"generator\":\"Khronos glTF Blender I/O v4.3.47\"%s",
+             (int)(asset - text), text, asset + 5);
     lx_scene *scene;
     lx_error error;
     if (import_text(whole, strlen(whole), &scene, &error) != LX_OK) fail_msg("%s", error.message);
@@ -438,7 +513,8 @@ static void strange_sizes_get_a_warning(void **state)
 static void ignored_extensions_are_noted_once(void **state)
 {
     (void)state;
-    lx_scene_destroy(import_triangle(",'extensionsUsed':['KHR_materials_ior','KHR_texture_transform','ACME_secret'],'extensionsRequired':['KHR_materials_ior']" ONE_NODE));
+    lx_scene_destroy(import_triangle(",'extensionsUsed':['KHR_materials_ior','KHR_texture_transform','ACME_secret'],'"
+                                     "extensionsRequired':['KHR_materials_ior']" ONE_NODE));
     assert_logged("note: extensions that are ignored: KHR_materials_ior, ACME_secret\n");
 }
 
