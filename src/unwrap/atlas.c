@@ -198,6 +198,21 @@ static void keep_scene_atlas(lx_unwrap_job *job)
     atlas->texels_per_m = (float)((double)atlas->page_size * sqrt(uv_area / area));
 }
 
+// A chart longer than a page would keep the density of the whole scene down. At the asked density, or at the one that would
+// use every texel, it has to fit; a square that fills the page by itself just does.
+static double longest_chart(const lx_unwrap_job *job)
+{
+    const double page = (double)job->desc.page_size, border = (job->desc.padding + 1) / 2;
+    if (job->desc.texels_per_m > 0) return (page - 2 * border - 1) / (double)job->desc.texels_per_m;
+    double area = 0;
+    for (uint32_t m = 0; m < job->mesh_count; ++m)
+        for (uint32_t i = 0; i < job->meshes[m].instance_count; ++i) {
+            const double size = job->meshes[m].size * (double)job->ratios[job->instances[job->meshes[m].first_instance + i]];
+            area += size * size;
+        }
+    return 1.02 * sqrt(area / job->desc.max_pages);
+}
+
 static void warn_of_flaws(const lx_unwrap_job *job)
 {
     for (uint32_t m = 0; m < job->mesh_count; ++m) {
@@ -219,6 +234,7 @@ static lx_result build(lx_unwrap_job *job, lx_error *error)
         goto cleanup;
     }
     LX_TRY(lx_unwrap_run(job, lx_measure_mesh, 0.05, error));
+    job->longest_chart = longest_chart(job);
     if (!job->desc.force_unwrap) {
         LX_TRY(lx_unwrap_run(job, read_set, 0.1, error));
         LX_TRY(find_scene_atlas(job, &found, &flaw, error));

@@ -10,9 +10,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double grow_cosine = 0.70710678118654752; // 45° around the mean normal: a cylinder is four charts
+static const double grow_cosine = 0.64;                // 50° around the mean normal: a cylinder is four charts, a 45° bevel joins
 static const double merge_angle = 0.90;                // 51.6°, of bounding cones
+static const double merge_crease = 0.70;               // 40°: sharper folds between two charts stay a border
 static const double merge_min_shared = 0.15;           // of the smaller outline; less makes dumbbells
+static const double crumb_share = 0.05;                // a chart this small beside its neighbour joins it more readily:
+static const double crumb_angle = 1.10;                // up to 63°, whatever the fold; better squeezed than a padding of its own
 enum { merge_passes = 8, evict_rounds = 6 };
 
 void lx_segmentation_release(lx_segmentation *segmentation)
@@ -126,13 +129,14 @@ static lx_result grow_all(const lx_patch *patch, const seed *seeds, uint32_t see
 typedef struct chart_state {
     lx_dvec3 sum;      // of area × normal
     lx_dvec3 normal;
+    double area;
     double cone;       // radians that bound the deviation of all triangles from `normal`
     double outline;    // length of the border
     uint32_t parent;   // union-find
     bool busy;         // took part in a merge of this pass
 } chart_state;
 
-typedef struct contact { uint32_t a, b; double length; } contact;
+typedef struct contact { uint32_t a, b; double length, fold; } contact; // fold: length × angle between the triangles
 
 static int compare_contacts(const void *pa, const void *pb)
 {
@@ -189,15 +193,17 @@ static size_t gather_contacts(const lx_patch *patch, const uint32_t *chart_of, c
         if (a == b) continue;
         const double length = edge_length(patch, h);
         states[a].outline += length;
-        if (b != LX_NONE && a < b) contacts[count++] = (contact){a, b, length};
+        if (b != LX_NONE && a < b) contacts[count++] = (contact){a, b, length, length * angle_between(patch->normals[t], patch->normals[other])};
     }
     qsort(contacts, count, sizeof *contacts, compare_contacts);
     size_t kept = 0;
     for (size_t i = 0; i < count; ++i) {
-        if (kept > 0 && contacts[kept - 1].a == contacts[i].a && contacts[kept - 1].b == contacts[i].b)
+        if (kept > 0 && contacts[kept - 1].a == contacts[i].a && contacts[kept - 1].b == contacts[i].b) {
             contacts[kept - 1].length += contacts[i].length;
-        else
+            contacts[kept - 1].fold += contacts[i].fold;
+        } else {
             contacts[kept++] = contacts[i];
+        }
     }
     return kept;
 }
@@ -211,16 +217,21 @@ static uint32_t merge_pass(const lx_patch *patch, const uint32_t *chart_of, char
         states[c].busy = false;
     }
     const size_t count = gather_contacts(patch, chart_of, states, contacts);
-    for (size_t i = 0; i < count; ++i) // lengths become shares
+    for (size_t i = 0; i < count; ++i) { // folds become mean angles, lengths become shares
+        contacts[i].fold /= contacts[i].length;
         contacts[i].length /= fmin(states[contacts[i].a].outline, states[contacts[i].b].outline);
+    }
     qsort(contacts, count, sizeof *contacts, compare_contact_shares);
     uint32_t merged = 0;
     for (size_t i = 0; i < count && contacts[i].length >= merge_min_shared; ++i) {
         chart_state *a = &states[contacts[i].a], *b = &states[contacts[i].b];
         if (a->busy || b->busy) continue;
+        const bool crumb = fmin(a->area, b->area) < crumb_share * fmax(a->area, b->area);
+        if (!crumb && contacts[i].fold > merge_crease) continue;
         const lx_dvec3 sum = lx_dmad(a->sum, b->sum, 1), normal = lx_dnormalize(sum);
         const double cone = fmax(angle_between(normal, a->normal) + a->cone, angle_between(normal, b->normal) + b->cone);
-        if (cone > merge_angle) continue;
+        if (cone > (crumb ? crumb_angle : merge_angle)) continue;
+        a->area += b->area;
         a->sum = sum;
         a->normal = normal;
         a->cone = cone;
@@ -249,6 +260,7 @@ static lx_result merge(const lx_patch *patch, lx_segmentation *out, lx_error *er
     for (uint32_t t = 0; t < patch->triangle_count; ++t) {
         if (out->chart_of[t] == LX_NO_CHART) continue;
         chart_state *s = &states[out->chart_of[t]];
+        s->area += patch->areas[t];
         s->cone = fmax(s->cone, angle_between(s->normal, patch->normals[t]));
     }
     for (int pass = 0; pass < merge_passes; ++pass)
@@ -280,8 +292,7 @@ static lx_result evict(const lx_patch *patch, uint32_t first_chart, lx_segmentat
     return LX_OK;
 }
 
-// Numbers the connected parts of all charts anew, in order of their first triangle; parts keep the normal.
-static lx_result number_components(const lx_patch *patch, lx_segmentation *out, lx_error *error)
+lx_result lx_segmentation_connect(const lx_patch *patch, lx_segmentation *out, lx_error *error)
 {
     const uint32_t count = patch->triangle_count;
     uint32_t *stack = lx_malloc_array(count, sizeof *stack);
@@ -349,7 +360,7 @@ lx_result lx_segment(const lx_patch *patch, const atomic_bool *stop, lx_segmenta
         out->chart_of[t] = lx_segmentation_add(out, patch->normals[t]);
         if (out->chart_of[t] == LX_NONE) LX_TRY(lx_fail_memory(error, "chart segmentation"));
     }
-    LX_TRY(number_components(patch, out, error));
+    LX_TRY(lx_segmentation_connect(patch, out, error));
 cleanup:
     lx_free(seeds);
     lx_free(queue.items);

@@ -73,6 +73,7 @@ lx_result lx_measure_mesh(void *user, size_t index, uint32_t worker, lx_error *e
         mesh->metric = metric;
         mesh->density = density;
     }
+    mesh->size = largest;
     for (uint32_t i = 0; i < mesh->instance_count; ++i) {
         float *ratio = &job->ratios[job->instances[mesh->first_instance + i]];
         *ratio = largest > 0 ? (float)((double)*ratio / largest) : 1;
@@ -123,6 +124,7 @@ static lx_result unwrap_primitive(lx_unwrap_job *job, lx_mesh_job *mesh, uint32_
     LX_TRY(lx_patch_init(&patch, primitive, &mesh->metric, error));
     LX_TRY(lx_segment(&patch, &job->stop, &segmentation, error));
     LX_TRY(lx_split_overlaps(&patch, &job->stop, &segmentation, error));
+    LX_TRY(lx_split_long_charts(&patch, job->longest_chart / (mesh->density * density), &segmentation, error));
     LX_TRY(lx_project_charts(&patch, &segmentation, index, density, &mesh->charts, out->corner_uv, out->triangle_chart, error));
     LX_TRY(find_donors(mesh, &patch, index, out->triangle_chart, error));
 cleanup:

@@ -458,12 +458,15 @@ lx_result lx_pack_charts(const lx_chart_set *set, double texels_per_m, uint32_t 
     p.scales = scales;
     p.longest = longest;
 
-    // Large meshes lie across the page as a strip; small ones try several shapes and keep the smallest area.
+    // Large meshes become columns of a whole, a half, a third … of the page, so that they stand side by side without gaps;
+    // small ones try several shapes and keep the smallest area.
     static const double shapes[] = {1.0, 1.3, 0.8, 1.7, 1.15, 2.2, 0.9};
-    const uint32_t tries = alone || cells > 0.25 * limit * limit ? 1 : count <= 64 ? 7 : count <= 512 ? 3 : 1;
+    const double columns = alone ? 1 : fmax(1, floor(limit / sqrt(cells)));
+    const bool large = columns <= 8;
+    const uint32_t tries = large ? 1 : count <= 64 ? 7 : count <= 512 ? 3 : 1;
     double best_area = INFINITY;
     for (uint32_t i = 0; i < tries; ++i) {
-        double wish = tries == 1 && (alone || cells > 0.25 * limit * limit) ? limit : ceil(sqrt(cells) * shapes[i]) + border;
+        double wish = large ? floor(limit / columns) : ceil(sqrt(cells) * shapes[i]) + border;
         wish = fmin(fmax(wish, narrowest + 2 * border), limit);
         uint32_t width = (uint32_t)wish, w = 0, h = 0;
         bool fits = false;

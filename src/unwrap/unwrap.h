@@ -61,13 +61,15 @@ typedef struct lx_segmentation {
     lx_dvec3 *normals;     ///< [chart_count] direction of projection, unit.
 } lx_segmentation;
 
-#define lx_keep_cosine 0.5
+#define lx_keep_cosine 0.42 // 65°
 
 /// `stop` (may be NULL) ends the work early with LX_ERROR_CANCELLED.
 lx_result lx_segment(const lx_patch *patch, const atomic_bool *stop, lx_segmentation *out, lx_error *error);
 void lx_segmentation_release(lx_segmentation *segmentation);
 /// Adds a chart with this normal and returns its number, LX_NONE without memory.
 uint32_t lx_segmentation_add(lx_segmentation *segmentation, lx_dvec3 normal);
+/// Numbers the connected parts of all charts anew, in order of their first triangle; parts keep the normal.
+lx_result lx_segmentation_connect(const lx_patch *patch, lx_segmentation *segmentation, lx_error *error);
 
 /// Splits charts until none overlaps itself in projection.
 lx_result lx_split_overlaps(const lx_patch *patch, const atomic_bool *stop, lx_segmentation *segmentation, lx_error *error);
@@ -98,6 +100,9 @@ typedef struct lx_chart_set {
 } lx_chart_set;
 
 void lx_chart_set_release(lx_chart_set *set);
+
+/// Cuts charts that are longer than `longest` across, between triangles, as far as that makes them shorter.
+lx_result lx_split_long_charts(const lx_patch *patch, double longest, lx_segmentation *segmentation, lx_error *error);
 
 /// Appends the charts of a patch to `set`; corner positions in the chart's rectangle go to corner_xy, numbers to triangle_chart.
 lx_result lx_project_charts(const lx_patch *patch, const lx_segmentation *segmentation, uint32_t primitive, double density,
@@ -174,6 +179,7 @@ typedef struct lx_mesh_job {
     uint64_t triangle_count;                       ///< Of its lit primitives.
     lx_metric metric;      ///< That of the instance that needs the most texels.
     double density;        ///< luxel_density of that instance.
+    double size;           ///< Square root of its area, times that density.
     bool has_set;          ///< A lit primitive brings TEXCOORD_1.
     bool existing;         ///< `set` serves.
     const char *flaw;      ///< Why the file's set was not taken.
@@ -200,6 +206,7 @@ typedef struct lx_unwrap_job {
     atomic_bool stop;
     const lx_progress_sink *sink; ///< The caller's.
     double started, progress_low, progress_high;
+    double longest_chart;  ///< Metres × density: what is longer would limit the density of all.
     double texels_per_m;   ///< Of the evaluation that runs.
 } lx_unwrap_job;
 
