@@ -282,10 +282,13 @@ static float offset_component(float position, float normal)
     return position;
 }
 
+// Coordinates of different size get steps of different size, so the sum of all three would also drift along the surface, and near an edge
+// through the next wall. Only its share along the normal is taken.
 lx_vec3 lx_offset_origin(lx_vec3 position, lx_vec3 normal)
 {
-    return (lx_vec3){offset_component(position.x, normal.x), offset_component(position.y, normal.y),
-                     offset_component(position.z, normal.z)};
+    const lx_vec3 moved = {offset_component(position.x, normal.x), offset_component(position.y, normal.y),
+                           offset_component(position.z, normal.z)};
+    return lx_mad(position, normal, lx_dot(lx_sub(moved, position), normal));
 }
 
 void lx_ray_step_past(lx_ray *ray, const lx_hit *hit)
