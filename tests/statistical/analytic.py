@@ -17,7 +17,7 @@ import tempfile
 import time
 
 import measure
-import lamps, emitters, skies, panes
+import lamps, emitters, skies, panes, bounces
 
 
 def number(value):

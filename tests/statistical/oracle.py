@@ -248,4 +248,6 @@ class CubeRadiosity:
         return [self._place(w, s / n, t / n) for s, t in ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1))]
 
     def irradiance(self, point, normal):
-        return sum(self.radiosity[p] * polygon(self._corners(*patch), point, normal) for p, patch in enumerate(self.patches))
+        """At a point of a wall, which does not see its own wall."""
+        return sum(self.radiosity[p] * polygon(self._corners(*patch), point, normal) for p, patch in enumerate(self.patches)
+                   if self._normal(patch[0]) != tuple(normal))
