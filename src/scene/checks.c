@@ -93,23 +93,23 @@ static void advise_on_lights(const lx_scene *scene)
     lx_log_warning(scene->context->log, "scene: no lights and no emissive materials; without a sky all will be black");
 }
 
-static void advise_blender_user(const lx_scene *scene, bool file_has_lights, bool has_luxel_keys)
+static void advise_blender_user(const lx_scene *scene, bool file_has_lights, bool has_extras)
 {
     if (!scene->from_blender) return;
     if (!file_has_lights && scene->light_count == 0)
         lx_log_note(scene->context->log,
                     "exported by Blender without lights: if there are lamps in the scene, tick Punctual Lights "
                     "in the export dialog (Include > Data, or Data > Lighting); it is off by default");
-    if (!has_luxel_keys)
+    if (!has_extras)
         lx_log_note(scene->context->log,
-                    "exported by Blender without luxel_ properties: if objects have any, tick Custom Properties "
+                    "exported by Blender without any extras: if objects have luxel_ properties, tick Custom Properties "
                     "in the export dialog (Include); it is off by default");
 }
 
-void lx_scene_advise(const lx_scene *scene, lx_light_units units, bool file_has_lights, bool has_luxel_keys)
+void lx_scene_advise(const lx_scene *scene, lx_light_units units, bool file_has_lights, bool has_extras)
 {
     advise_on_size(scene);
     advise_on_lights(scene);
     advise_on_emitters(scene, units);
-    advise_blender_user(scene, file_has_lights, has_luxel_keys);
+    advise_blender_user(scene, file_has_lights, has_extras);
 }

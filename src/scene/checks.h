@@ -5,7 +5,7 @@
 #include "scene/scene.h"
 
 /// Warns about a scene without lights, faint emitters, strange sizes, and export boxes that were not ticked.
-/// `file_has_lights`: the file defines lights, used or not. `has_luxel_keys`: an authoring key was met.
-void lx_scene_advise(const lx_scene *scene, lx_light_units units, bool file_has_lights, bool has_luxel_keys);
+/// `file_has_lights`: the file defines lights, used or not. `has_extras`: anything in it has extras.
+void lx_scene_advise(const lx_scene *scene, lx_light_units units, bool file_has_lights, bool has_extras);
 
 #endif

@@ -4,8 +4,6 @@
 
 #include "scene/scene.h"
 
-static inline bool lx_is_finite3(lx_vec3 v) { return isfinite(v.x) && isfinite(v.y) && isfinite(v.z); }
-
 typedef enum lx_topology {
     LX_TRIANGLES = 4,
     LX_TRIANGLE_STRIP = 5,

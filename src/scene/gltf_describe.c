@@ -113,7 +113,7 @@ static json_t *describe_warnings(const lx_scene *scene)
 #define DESCRIBE_ALL(root, key, count, elements, function)                                                             \
     do {                                                                                                               \
         json_t *list = json_array();                                                                                   \
-        for (uint32_t i = 0; list && i < (count); ++i) json_array_append_new(list, function(&(elements)[i]));          \
+        for (uint32_t i = 0; i < (count); ++i) failed |= json_array_append_new(list, function(&(elements)[i])) != 0;   \
         failed |= json_object_set_new(root, key, list) != 0;                                                           \
     } while (0)
 

@@ -1,6 +1,6 @@
 // Authoring keys (`luxel_…`) in the extras of nodes, lights and materials. In Blender they are custom properties, so
 // numbers, texts and check boxes come in whatever type a person happened to choose.
-#include "scene/gltf_extras.h"
+#include "scene/gltf_reader.h"
 
 #include "base/error.h"
 #include "math/color.h"
@@ -250,12 +250,10 @@ static const char *nearest_key(const char *key)
     return nearest;
 }
 
-static lx_result read_key(const key_site *site, const json_t *value, lx_extras_place place, uint32_t *count,
-                          lx_error *error)
+static lx_result read_key(const key_site *site, const json_t *value, lx_extras_place place, lx_error *error)
 {
     for (int i = 0; i < key_count; ++i) {
         if (strcmp(site->key, keys[i].key) != 0) continue;
-        ++*count;
         if (keys[i].places & (int)place) return keys[i].read ? keys[i].read(site, value, error) : LX_OK;
         lx_log_warning(site->log, "%s: %s has no effect here; it belongs to %s", site->object->label, site->key,
                        keys[i].places & material ? "a node or material" : "a node");
@@ -266,17 +264,18 @@ static lx_result read_key(const key_site *site, const json_t *value, lx_extras_p
     return LX_OK;
 }
 
-lx_result lx_gltf_extras_read(lx_log *log, lx_arena *strings, const lx_gltf_object *object, lx_extras_place place,
-                              lx_gltf_extras *out, uint32_t *count, lx_error *error)
+lx_result lx_gltf_extras_read(struct lx_gltf_reader *reader, const lx_gltf_object *object, lx_extras_place place,
+                              lx_gltf_extras *out, lx_error *error)
 {
     *out = lx_gltf_extras_unset();
     const char *key;
     json_t *value;
     json_object_foreach(json_object_get(object->json, "extras"), key, value)
     {
+        ++reader->extras_count;
         if (strncmp(key, "luxel_", 6) != 0) continue;
-        const key_site site = {log, strings, object, key, out};
-        const lx_result result = read_key(&site, value, place, count, error);
+        const key_site site = {reader->log, &reader->scene->strings, object, key, out};
+        const lx_result result = read_key(&site, value, place, error);
         if (result != LX_OK) return result;
     }
     return LX_OK;

@@ -5,6 +5,8 @@
 #include "scene/gltf_json.h"
 #include "scene/scene.h"
 
+struct lx_gltf_reader;
+
 typedef enum lx_area_shape { LX_AREA_NONE, LX_AREA_RECT, LX_AREA_DISK } lx_area_shape;
 
 /// The keys of one object. What is not set can be completed from an object that ranks lower.
@@ -31,10 +33,9 @@ typedef enum lx_extras_place {
 
 lx_gltf_extras lx_gltf_extras_unset(void);
 
-/// Reads the luxel_ keys of object's extras. Unknown keys and values that make no sense get a warning. `key_count` is
-/// increased by the number of known keys met.
-lx_result lx_gltf_extras_read(lx_log *log, lx_arena *strings, const lx_gltf_object *object, lx_extras_place place,
-                              lx_gltf_extras *out, uint32_t *key_count, lx_error *error);
+/// Reads the luxel_ keys of object's extras. Unknown keys and values that make no sense get a warning.
+lx_result lx_gltf_extras_read(struct lx_gltf_reader *reader, const lx_gltf_object *object, lx_extras_place place,
+                              lx_gltf_extras *out, lx_error *error);
 
 /// What `first` leaves open is taken from `second`.
 lx_gltf_extras lx_gltf_extras_merge(lx_gltf_extras first, const lx_gltf_extras *second);

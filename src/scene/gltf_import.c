@@ -120,7 +120,7 @@ static lx_result read_scene(lx_gltf_reader *reader, const void *data, size_t siz
     LX_TRY(lx_gltf_load_lights(reader, error));
     LX_TRY(lx_gltf_load_cameras(reader, error));
     LX_TRY(lx_gltf_load_sources(reader, error));
-    lx_scene_advise(reader->scene, desc->light_units, reader->counts[LX_GLTF_LIGHT] > 0, reader->luxel_key_count > 0);
+    lx_scene_advise(reader->scene, desc->light_units, reader->counts[LX_GLTF_LIGHT] > 0, reader->extras_count > 0);
 cleanup:
     return result;
 }

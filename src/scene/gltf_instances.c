@@ -7,10 +7,9 @@
 #include <stdio.h>
 #include <string.h>
 
-#define MAX_TRIANGLES (1ull << 31) // of all instances; indices of triangles stay below 2^31 everywhere
+#define MAX_TRIANGLES (1ull << 31) // in all instances
 #define MAX_COORDINATE 1e15f       // metres: areas and volumes further out do not fit into floats
-#define MAX_MEASURED                                                                                                   \
-    (100ull << 20) // triangles whose corners are all looked at; the boxes of later instances are looser
+#define MAX_MEASURED (8ull << 20)  // triangles that are measured one by one; boxes of later instances are looser
 
 static lx_result add_surfaces(lx_gltf_reader *reader, lx_instance *instance, uint32_t instance_index,
                               int8_t transparent, lx_error *error)

@@ -81,8 +81,7 @@ static lx_result read_lamp(lx_gltf_reader *reader, uint32_t index, lamp *out, lx
     LX_TRY(read_kind(&out->object, &out->kind, error));
     LX_TRY(read_strength(reader, &out->object, out, error));
     if (out->kind == LX_LIGHT_SPOT) LX_TRY(read_cone(&out->object, out, error));
-    LX_TRY(lx_gltf_extras_read(reader->log, &reader->scene->strings, &out->object, LX_EXTRAS_LIGHT, &out->extras,
-                               &reader->luxel_key_count, error));
+    LX_TRY(lx_gltf_extras_read(reader, &out->object, LX_EXTRAS_LIGHT, &out->extras, error));
 cleanup:
     return result;
 }

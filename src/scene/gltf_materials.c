@@ -142,8 +142,7 @@ cleanup:
 static lx_result read_authoring(lx_gltf_reader *reader, const lx_gltf_object *object, lx_material *out, lx_error *error)
 {
     lx_gltf_extras extras;
-    const lx_result result = lx_gltf_extras_read(reader->log, &reader->scene->strings, object, LX_EXTRAS_MATERIAL,
-                                                 &extras, &reader->luxel_key_count, error);
+    const lx_result result = lx_gltf_extras_read(reader, object, LX_EXTRAS_MATERIAL, &extras, error);
     if (result != LX_OK) return result;
     out->transparent = extras.transparent == 1;
     out->mode = extras.mode >= 0 ? (lx_light_mode)extras.mode : LX_MODE_BAKED;

@@ -163,12 +163,24 @@ cleanup:
     return result;
 }
 
+static bool are_finite(const float *values, size_t count)
+{
+    for (size_t i = 0; values && i < count; ++i)
+        if (!isfinite(values[i])) return false;
+    return true;
+}
+
 static lx_result check_morphed(const primitive_job *job, lx_error *error)
 {
-    for (uint32_t i = 0; i < job->out.vertex_count; ++i)
-        if (!lx_is_finite3(job->out.positions[i]) || (job->out.normals && !lx_is_finite3(job->out.normals[i])))
-            return lx_fail(error, LX_ERROR_FORMAT, "%s: morph targets make vertex %u infinite", job->object.label, i);
-    return LX_OK;
+    const lx_primitive *out = &job->out;
+    const size_t count = out->vertex_count;
+    bool finite = are_finite((const float *)out->positions, 3 * count) &&
+                  are_finite((const float *)out->normals, 3 * count) &&
+                  are_finite((const float *)out->colors, 4 * count);
+    for (int set = 0; set < lx_texcoord_sets; ++set)
+        finite = finite && are_finite((const float *)out->texcoords[set], 2 * count);
+    if (finite) return LX_OK;
+    return lx_fail(error, LX_ERROR_FORMAT, "%s: morph targets make its vertices infinite", job->object.label);
 }
 
 static lx_result apply_targets(primitive_job *job, lx_error *error)
@@ -451,8 +463,7 @@ lx_result lx_gltf_check_meshes(lx_gltf_reader *reader, lx_error *error)
         reader->first_variant[m] = -1;
         LX_TRY(lx_gltf_element(reader, LX_GLTF_MESH, m, &object, error));
         LX_TRY(lx_gltf_get_array(&object, "primitives", &primitives, &count, error));
-        LX_TRY(lx_gltf_extras_read(reader->log, &reader->scene->strings, &object, LX_EXTRAS_ELSEWHERE, &extras,
-                                   &reader->luxel_key_count, error));
+        LX_TRY(lx_gltf_extras_read(reader, &object, LX_EXTRAS_ELSEWHERE, &extras, error));
         for (uint32_t i = 0; i < count; ++i) {
             lx_gltf_object primitive;
             LX_TRY(primitive_object(&object, primitives, i, &primitive, error));

@@ -137,8 +137,7 @@ static lx_result reach_default_scene(lx_gltf_reader *reader, lx_error *error)
     if (index < 0 && reader->counts[LX_GLTF_SCENE] > 0) index = 0;
     if (index >= 0) {
         LX_TRY(lx_gltf_element(reader, LX_GLTF_SCENE, (uint32_t)index, &scene, error));
-        LX_TRY(lx_gltf_extras_read(reader->log, &reader->scene->strings, &scene, LX_EXTRAS_ELSEWHERE, &extras,
-                                   &reader->luxel_key_count, error));
+        LX_TRY(lx_gltf_extras_read(reader, &scene, LX_EXTRAS_ELSEWHERE, &extras, error));
         LX_TRY(take_scene_roots(reader, &scene, error));
     } else {
         take_all_roots(reader);
@@ -285,8 +284,7 @@ static lx_result complete_node(lx_gltf_reader *reader, uint32_t index, lx_error 
     for (int i = 0; i < 16; ++i)
         if (!isfinite(node->world.m[i]))
             return lx_fail(error, LX_ERROR_FORMAT, "%s: its place in the world is not finite", object.label);
-    LX_TRY(lx_gltf_extras_read(reader->log, &reader->scene->strings, &object, LX_EXTRAS_NODE, &node->extras,
-                               &reader->luxel_key_count, error));
+    LX_TRY(lx_gltf_extras_read(reader, &object, LX_EXTRAS_NODE, &node->extras, error));
     node->area_owner = node->extras.area != LX_AREA_NONE ? (int32_t)index : parent ? parent->area_owner : -1;
     node->moves = node->transform_animated || (parent && parent->moves);
     node->holds_no_lamps = is_light_group(object.json) || (parent && parent->holds_no_lamps);

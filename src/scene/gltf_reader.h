@@ -92,7 +92,7 @@ typedef struct lx_gltf_reader {
 
     lx_gltf_light_use *light_uses; ///< One per light of the scene.
     size_t light_use_capacity;
-    uint32_t luxel_key_count; ///< luxel_ keys met in nodes, lights and materials.
+    uint32_t extras_count; ///< Keys of any kind in the extras that were read.
 } lx_gltf_reader;
 
 // gltf_import.c

@@ -7,7 +7,7 @@
 
 static const lx_vec4 white = {1, 1, 1, 1};
 
-// The decoded image behind a slot; NULL: none, reads as white.
+// The decoded image behind a slot, always of bytes: glTF has PNG, JPEG and WebP. NULL: none, reads as white.
 static const lx_image *image_of(const lx_scene *scene, const lx_texture_slot *slot)
 {
     if (slot->texture < 0) return NULL;
@@ -30,26 +30,13 @@ static uint32_t wrap_texel(float t, uint32_t size, lx_wrap wrap)
     return texel < size ? texel : size - 1;
 }
 
-static lx_vec4 texel_u8(const lx_image *image, size_t at, bool srgb)
+static lx_vec4 fetch(const lx_image *image, uint32_t x, uint32_t y, bool srgb)
 {
-    const uint8_t *p = image->u8 + at * image->channels;
+    const uint8_t *p = image->u8 + ((size_t)y * image->width + x) * image->channels;
     const uint8_t r = p[0], g = image->channels >= 3 ? p[1] : r, b = image->channels >= 3 ? p[2] : r;
     const float alpha = image->channels == 4 ? p[3] / 255.0f : image->channels == 2 ? p[1] / 255.0f : 1;
     if (srgb) return (lx_vec4){lx_srgb_byte_to_linear[r], lx_srgb_byte_to_linear[g], lx_srgb_byte_to_linear[b], alpha};
     return (lx_vec4){r / 255.0f, g / 255.0f, b / 255.0f, alpha};
-}
-
-static lx_vec4 texel_f32(const lx_image *image, size_t at)
-{
-    const float *p = image->f32 + at * image->channels;
-    const float r = p[0], g = image->channels >= 3 ? p[1] : r, b = image->channels >= 3 ? p[2] : r;
-    return (lx_vec4){r, g, b, image->channels == 4 ? p[3] : image->channels == 2 ? p[1] : 1};
-}
-
-static lx_vec4 fetch(const lx_image *image, uint32_t x, uint32_t y, bool srgb)
-{
-    const size_t at = (size_t)y * image->width + x;
-    return image->type == LX_PIXEL_U8 ? texel_u8(image, at, srgb) : texel_f32(image, at);
 }
 
 static lx_vec4 mix(lx_vec4 a, lx_vec4 b, float t)
@@ -85,9 +72,7 @@ bool lx_texture_has_alpha(const lx_scene *scene, const lx_texture_slot *slot)
     const lx_image *image = image_of(scene, slot);
     if (!image || image->channels % 2 != 0) return false;
     const size_t texels = (size_t)image->width * image->height, step = image->channels;
-    for (size_t i = 0; i < texels; ++i) {
-        const size_t at = i * step + step - 1;
-        if (image->type == LX_PIXEL_U8 ? image->u8[at] < 255 : image->f32[at] < 1) return true;
-    }
+    for (size_t i = 0; i < texels; ++i)
+        if (image->u8[i * step + step - 1] < 255) return true;
     return false;
 }
