@@ -168,7 +168,8 @@ lx_result lx_baked_set(lx_baked *baked, const char *assignment, lx_error *error)
     if (!found) {
         char nearest[320];
         list_nearest(baked, name, nearest, sizeof nearest);
-        result = lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "there is no layer '%s'%s", name, layer_count ? nearest : "; there are no layers");
+        result = lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "there is no layer '%s'%s", name,
+                         layer_count ? nearest : "; there are no layers");
     }
 cleanup:
     lx_free(name);

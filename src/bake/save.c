@@ -1,4 +1,5 @@
-// A bake on its way to disk: one pass over pages and layers builds mip levels, which go into the pack and into the lightmap files asked for.
+// A bake on its way to disk: one pass over pages and layers builds mip levels, which go into the pack and into the lightmap files
+// asked for.
 #include "bake/save.h"
 
 #include "base/clock.h"

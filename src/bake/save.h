@@ -32,8 +32,8 @@ void lx_lightmap_writer_destroy(lx_lightmap_writer *writer);
 /// [layer_count] strings in `arena`; NULL: no memory.
 char **lx_layer_file_names(lx_arena *arena, const lx_layer *layers, uint32_t layer_count);
 
-/// Everything but the preview and luxel.json: scene.glb, luxel.pack, lightmaps, the sky. `out_manifest` describes it (borrows strings of the
-/// bake); summary.pack_bytes is filled. Calls `progress` with the stage "save".
+/// Everything but the preview and luxel.json: scene.glb, luxel.pack, lightmaps, the sky. `out_manifest` describes it (borrows strings
+/// of the bake); summary.pack_bytes is filled. Calls `progress` with the stage "save".
 lx_result lx_bake_write(lx_bake *bake, const lx_save_desc *desc, const lx_new_folder *folder, const lx_progress_sink *progress,
                         lx_manifest *out_manifest, lx_error *error);
 /// luxel.json.

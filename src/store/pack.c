@@ -261,7 +261,7 @@ lx_result lx_pack_begin(const lx_pack_desc *desc, lx_pack_writer **out_writer, l
     lx_result result = LX_OK;
     lx_pack_writer *writer = NULL;
     lx_pack_rect *sorted_rects = NULL;
-    file_layout layout;
+    file_layout layout = {0};
 
     LX_TRY(check_desc(desc, error));
     LX_TRY(writer_create(desc, &writer, error));

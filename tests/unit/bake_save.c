@@ -219,7 +219,8 @@ static void ktx2_files_hold_the_layers_and_mips_that_do_not_bleed(void **state)
                     const uint32_t chart_first = (x + 2) / 20, chart_last = (x + step + 2) / 20;
                     bool fits = false;
                     for (uint32_t chart = chart_first; chart <= chart_last; ++chart) {
-                        const float low = fixture_texel(0, layer, chart, x, y, 0), high = fixture_texel(0, layer, chart, x + step, y + step, 0);
+                        const float low = fixture_texel(0, layer, chart, x, y, 0);
+                        const float high = fixture_texel(0, layer, chart, x + step, y + step, 0);
                         fits |= got[0] * scale >= low * 0.997f && got[0] * scale <= high * 1.003f;
                     }
                     if (!fits) fail_msg("level %u, layer %u, texel %u %u: %g", level, layer, x, y, got[0] * scale);
@@ -325,10 +326,11 @@ static void file_names_are_plain_and_unique(void **state)
     char longest[200];
     memset(longest, 'x', sizeof longest - 1);
     longest[sizeof longest - 1] = '\0';
-    lx_layer layers[] = {{.name = "a/b"}, {.name = "a b"}, {.name = "A?B"}, {.name = ""},        {.name = "/../../etc"}, {.name = "Stra\xc3\x9f" "e"},
-                         {.name = longest}, {.name = "layer"}, {.name = "a_b_2"}, {.name = longest}, {.name = ".hidden"}};
-    const uint32_t count = sizeof layers / sizeof *layers;
+    lx_layer layers[] = {{.name = "a/b"},  {.name = "a b"},   {.name = "A?B"},   {.name = ""},      {.name = "/../../etc"},
+                         {.name = "Stra\xc3\x9f" "e"}, {.name = longest}, {.name = "layer"}, {.name = "a_b_2"}, {.name = longest},
+                         {.name = ".hidden"}};
     static const char *const want[] = {"a_b", "a_b_2", "A_B_3", "layer", "_.._.._etc", "Stra_e", NULL, "layer_2", "a_b_2_2", NULL, "_hidden"};
+    const uint32_t count = sizeof layers / sizeof *layers;
     lx_arena arena = {0};
     char **names = lx_layer_file_names(&arena, layers, count);
     assert_non_null(names);
@@ -419,9 +421,11 @@ static void recolouring_understands_what_people_type(void **state)
         lx_baked_get_layer(baked, lamp, c);
         for (int k = 0; k < 3; ++k) assert_float_equal(c[k], good[i].c[k], 1e-6);
     }
-    static const char *const bad[] = {"",           "lamp",       "=1,1,1",       "lamp=",         "lamp=1,1",     "lamp=1,1,1,1", "lamp=#fff",
-                                      "lamp=#gg0000", "lamp=1,1,1*",  "lamp=1,1,1*x",  "lamp=-1,0,0",   "lamp=nan,0,0", "lamp=inf,0,0", "lamp=1,1,1*-2",
-                                      "lamp=offf",  "lamp= 1,1,1", "lamp=1e60,0,0", "lamp=1,1,1*1e39", "lamp=1e20,1,1*1e20", "Lamp=off", "x*=off"};
+    static const char *const bad[] = {
+        "",         "lamp",          "=1,1,1",        "lamp=",        "lamp=1,1",      "lamp=1,1,1,1",    "lamp=#fff",
+        "lamp=#gg0000", "lamp=1,1,1*",   "lamp=1,1,1*x",  "lamp=-1,0,0",  "lamp=nan,0,0",  "lamp=inf,0,0",    "lamp=1,1,1*-2",
+        "lamp=offf",    "lamp= 1,1,1",   "lamp=1e60,0,0", "lamp=1,1,1*1e39", "lamp=1e20,1,1*1e20", "Lamp=off", "x*=off",
+    };
     for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
         lx_error error = {0};
         float c[3];

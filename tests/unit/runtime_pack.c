@@ -215,7 +215,8 @@ static void every_documented_rule_is_checked(void **state)
         put_u32(cases[i].at, cases[i].value);
         const lxrt_result result = open_pack(memory, sizeof memory, &pack);
         if (result != cases[i].result)
-            fail_msg("u32 at %zu = %u: %s, not %s", cases[i].at, cases[i].value, lxrt_result_name(result), lxrt_result_name(cases[i].result));
+            fail_msg("u32 at %zu = %u: %s, not %s", cases[i].at, cases[i].value, lxrt_result_name(result),
+                     lxrt_result_name(cases[i].result));
         assert_true((pack != NULL) == (result == LXRT_OK));
     }
 }
