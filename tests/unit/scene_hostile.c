@@ -144,6 +144,8 @@ static void broken_accessors_are_refused(void **state)
          "accessor 0: unknown componentType 5124"},
         {"{'bufferView':0,'componentType':5126,'count':3,'type':'VEC5'}", LX_ERROR_FORMAT,
          "accessor 0: unknown type 'VEC5'"},
+        {"{'bufferView':0,'componentType':5126,'count':1,'type':'MAT2'}", LX_ERROR_FORMAT,
+         "mesh 0 primitive 0 attributes: POSITION (accessor 0) is not of type VEC3"},
         {"{'bufferView':0,'componentType':5126,'count':3,'type':'VEC2'}", LX_ERROR_FORMAT,
          "mesh 0 primitive 0 attributes: POSITION (accessor 0) is not of type VEC3"},
         {"{'bufferView':2,'componentType':5126,'count':3,'type':'VEC3'}", LX_ERROR_FORMAT,
@@ -188,6 +190,7 @@ static void broken_buffers_are_refused(void **state)
         {"'buffers':[{'byteLength':5,'uri':'data:;base64,AAAA'}]",
          "buffer 0: byteLength 5 is more than the 3 bytes there are"},
         {"'buffers':[{'byteLength':3,'uri':'data:;base64,A*AA'}]", "buffer 0: data: URI is not valid base64"},
+        {"'cameras':[{'type':'box'}],'nodes':[{'camera':0}]", "scene: no mesh with triangles"},
         {"'buffers':[{'byteLength':3,'uri':'data:;base64'}]", "buffer 0: data: URI without a comma"},
         {"'buffers':[{'byteLength':4}],'bufferViews':[{'buffer':0,'byteLength':4}],'accessors':[{'bufferView':0,'"
          "componentType':5121,'count':1,'type':'VEC3'}],"
@@ -280,8 +283,8 @@ static void broken_materials_are_refused(void **state)
 
 #define WITH_IMAGE(image)                                                                                              \
     TRIANGLE_MATERIAL                                                                                                  \
-        ",'images':[" image                                                                                            \
-        "],'textures':[{'source':0}],'materials':[{'pbrMetallicRoughness':{'baseColorTexture':{'index':0}}}]" ONE_NODE
+    ",'images':[" image                                                                                                \
+    "],'textures':[{'source':0}],'materials':[{'pbrMetallicRoughness':{'baseColorTexture':{'index':0}}}]" ONE_NODE
 
 static void broken_images_are_refused_when_used(void **state)
 {

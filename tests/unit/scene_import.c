@@ -3,8 +3,6 @@
 
 #include "image/image.h"
 
-#include <meshoptimizer.h>
-
 // --- Primitives and accessors ---
 
 static void triangle_without_indices_is_read_in_vertex_order(void **state)
@@ -316,6 +314,42 @@ static void wrong_number_of_weights_is_refused(void **state)
                    "mesh 0 'face' primitive 0: 3 weights for 2 morph targets");
 }
 
+static void color_targets_may_have_three_or_four_channels(void **state)
+{
+    (void)state;
+    for (int channels = 3; channels <= 4; ++channels) {
+        char members[1024];
+        triangle_bin();
+        BIN_FLOATS(0.1f, 0.2f, 0.3f, 0.5f, 0.1f, 0.2f, 0.3f, 0.5f, 0.1f, 0.2f, 0.3f, 0.5f);
+        snprintf(
+            members, sizeof members,
+            "'bufferViews':[{'buffer':0,'byteLength':36},{'buffer':0,'byteOffset':36,'byteLength':48,'byteStride':16}],"
+            "'accessors':[{'bufferView':0,'componentType':5126,'count':3,'type':'VEC3'},"
+            "{'bufferView':1,'componentType':5126,'count':3,'type':'VEC4'},"
+            "{'bufferView':1,'componentType':5126,'count':3,'type':'VEC%d'}],"
+            "'meshes':[{'weights':[2],'primitives':[{'attributes':{'POSITION':0,'COLOR_0':1},'targets':[{'COLOR_0':2}]}"
+            "]}]" ONE_NODE,
+            channels);
+        lx_scene *scene = import_members(members);
+        assert_near(scene->primitives[0].colors[1].z, 0.9, 1e-6);
+        assert_near(scene->primitives[0].colors[1].w, channels == 4 ? 1.5 : 0.5, 1e-6);
+        lx_scene_destroy(scene);
+    }
+}
+
+static void morph_targets_that_overflow_are_refused(void **state)
+{
+    (void)state;
+    triangle_bin();
+    BIN_FLOATS(3e38f, 0, 0, 0, 0, 0, 0, 0, 0);
+    assert_refused(
+        "'bufferViews':[{'buffer':0,'byteLength':36},{'buffer':0,'byteOffset':36,'byteLength':36}],"
+        "'accessors':[{'bufferView':0,'componentType':5126,'count':3,'type':'VEC3'},{'bufferView':1,'componentType':"
+        "5126,'count':3,'type':'VEC3'}],"
+        "'meshes':[{'weights':[2],'primitives':[{'attributes':{'POSITION':0},'targets':[{'POSITION':1}]}]}]" ONE_NODE,
+        LX_ERROR_FORMAT, "mesh 0 primitive 0: morph targets make its vertices infinite");
+}
+
 // --- Hierarchy ---
 
 static void transforms_multiply_down_the_hierarchy(void **state)
@@ -423,6 +457,63 @@ static void what_moves_is_not_static_and_listed_once(void **state)
         "note: not static, so not baked: node 1 'leaf' (animated), node 2 'lamp' (animated), node 3 'hero' (skinned), "
         "node 4 'face' (animated shape)\n");
     lx_scene_destroy(scene);
+}
+
+static void long_lists_of_what_moves_are_cut(void **state)
+{
+    (void)state;
+    char nodes[2048] = ",'animations':[{'samplers':[{'input':0,'output':0}],'channels':[{'sampler':0,'target':{'node':"
+                       "0,'path':'scale'}}]}],"
+                       "'nodes':[{'children':[1,2,3,4,5,6,7,8,9,10]}";
+    for (int i = 0; i < 10; ++i) strcat(nodes, ",{'mesh':0}");
+    strcat(nodes, "]");
+    lx_scene_destroy(import_triangle(nodes));
+    assert_logged("node 8 (animated) and 2 more\n");
+    assert_not_logged("node 9");
+}
+
+static void bounds_of_very_many_triangles_come_from_boxes(void **state)
+{
+    (void)state;
+    // 600 instances of a mesh of 20000 triangles, all but one of them without area.
+    bin_clear();
+    BIN_FLOATS(0, 0, 0, 1, 0, 0, 0, 1, 0);
+    BIN_U32(0, 1, 2);
+    BIN_U32(599);
+    BIN_FLOATS(5, 6, 7);
+    lx_scene *scene = import_members(
+        "'extensionsUsed':['EXT_mesh_gpu_instancing'],'bufferViews':[{'buffer':0,'byteLength':36},{'buffer':0,'"
+        "byteOffset':36,'byteLength':12},"
+        "{'buffer':0,'byteOffset':48,'byteLength':4},{'buffer':0,'byteOffset':52,'byteLength':12}],"
+        "'accessors':[{'bufferView':0,'componentType':5126,'count':3,'type':'VEC3'},"
+        "{'componentType':5125,'count':60000,'type':'SCALAR','sparse':{'count':3,'indices':{'bufferView':1,'"
+        "componentType':5125},'values':{'bufferView':1}}},"
+        "{'componentType':5126,'count':600,'type':'VEC3','sparse':{'count':1,'indices':{'bufferView':2,'componentType':"
+        "5125},'values':{'bufferView':3}}}],"
+        "'meshes':[{'primitives':[{'attributes':{'POSITION':0},'indices':1}]}],"
+        "'nodes':[{'mesh':0,'extensions':{'EXT_mesh_gpu_instancing':{'attributes':{'TRANSLATION':2}}}}]");
+    assert_int_equal(scene->triangle_count, 12000000);
+    assert_vec3(scene->bounds.low, 0, 0, 0);
+    assert_vec3(scene->bounds.high, 6, 7, 7);
+    lx_scene_destroy(scene);
+}
+
+static void gpu_instances_with_unequal_counts_are_refused(void **state)
+{
+    (void)state;
+    triangle_bin();
+    assert_refused(
+        "'bufferViews':[{'buffer':0,'byteLength':36}],'accessors':[{'bufferView':0,'componentType':5126,'count':3,'"
+        "type':'VEC3'},"
+        "{'bufferView':0,'componentType':5126,'count':2,'type':'VEC3'}],'meshes':[{'primitives':[{'attributes':{'"
+        "POSITION':0}}]}],"
+        "'nodes':[{'mesh':0,'extensions':{'EXT_mesh_gpu_instancing':{'attributes':{'TRANSLATION':0,'SCALE':1}}}}]",
+        LX_ERROR_FORMAT, "node 0 EXT_mesh_gpu_instancing attributes: SCALE (accessor 1) has 2 elements, others 3");
+    assert_triangle_refused(
+        ",'nodes':[{'mesh':0,'extensions':{'EXT_mesh_gpu_instancing':{'attributes':{'ROTATION':0}}}}]", LX_ERROR_FORMAT,
+        "node 0 EXT_mesh_gpu_instancing attributes: ROTATION (accessor 0) is not of type VEC4");
+    assert_triangle_refused(",'nodes':[{'mesh':0,'extensions':{'EXT_mesh_gpu_instancing':{}}}]", LX_ERROR_FORMAT,
+                            "node 0 EXT_mesh_gpu_instancing: no attributes");
 }
 
 static void animation_pointers_move_nodes_but_colours_do_not(void **state)
@@ -631,51 +722,6 @@ static void texture_without_readable_source_is_white(void **state)
     lx_scene_destroy(scene);
 }
 
-// --- EXT_meshopt_compression ---
-
-static void meshopt_views_are_decoded_and_filtered(void **state)
-{
-    (void)state;
-    static const float positions[] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
-    static const unsigned indices[] = {0, 1, 2};
-    static const float normals[] = {0, 0, 1, 0, 0, 0.6f, 0.8f, 0, 1, 0, 0, 0};
-    int8_t octahedral[12];
-    uint8_t packed[3][256];
-    meshopt_encodeFilterOct(octahedral, 3, 4, 8, normals);
-    const size_t sizes[3] = {meshopt_encodeVertexBuffer(packed[0], 256, positions, 3, 12),
-                             meshopt_encodeIndexBuffer(packed[1], 256, indices, 3),
-                             meshopt_encodeVertexBuffer(packed[2], 256, octahedral, 3, 4)};
-    bin_clear();
-    size_t at[3];
-    for (int i = 0; i < 3; ++i) at[i] = bin_bytes(packed[i], sizes[i]);
-    char buffer[1024], members[3072];
-    // Buffer 1 has no content: the file requires the extension.
-    snprintf(buffer, sizeof buffer, "{'byteLength':%zu,'uri':'data:;base64,", fixture_bin_size);
-    append_base64(buffer, fixture_bin, fixture_bin_size);
-    bin_clear();
-    snprintf(
-        members, sizeof members,
-        "'buffers':[%s'},{'byteLength':64,'extensions':{'EXT_meshopt_compression':{'fallback':true}}}],"
-        "'extensionsUsed':['EXT_meshopt_compression'],'extensionsRequired':['EXT_meshopt_compression'],'bufferViews':["
-        "{'buffer':1,'byteLength':36,'extensions':{'EXT_meshopt_compression':{'buffer':0,'byteOffset':%zu,'byteLength':"
-        "%zu,'byteStride':12,'count':3,'mode':'ATTRIBUTES'}}},"
-        "{'buffer':1,'byteOffset':36,'byteLength':6,'extensions':{'EXT_meshopt_compression':{'buffer':0,'byteOffset':%"
-        "zu,'byteLength':%zu,'byteStride':2,'count':3,'mode':'TRIANGLES'}}},"
-        "{'buffer':1,'byteOffset':44,'byteLength':12,'byteStride':4,'extensions':{'EXT_meshopt_compression':{'buffer':"
-        "0,'byteOffset':%zu,'byteLength':%zu,'byteStride':4,'count':3,'mode':'ATTRIBUTES','filter':'OCTAHEDRAL'}}}],"
-        "'accessors':[{'bufferView':0,'componentType':5126,'count':3,'type':'VEC3'},{'bufferView':1,'componentType':"
-        "5123,'count':3,'type':'SCALAR'},"
-        "{'bufferView':2,'componentType':5120,'normalized':true,'count':3,'type':'VEC3'}],"
-        "'meshes':[{'primitives':[{'attributes':{'POSITION':0,'NORMAL':2},'indices':1}]}]" ONE_NODE,
-        buffer, at[0], sizes[0], at[1], sizes[1], at[2], sizes[2]);
-    lx_scene *scene = import_members(members);
-    assert_memory_equal(scene->primitives[0].positions, positions, sizeof positions);
-    assert_int_equal(scene->primitives[0].triangle_count, 1);
-    assert_near(scene->primitives[0].normals[1].y, 0.6, 0.02);
-    assert_null(scene->buffers[1].data);
-    lx_scene_destroy(scene);
-}
-
 // --- Cameras ---
 
 static void cameras_lose_their_scale(void **state)
@@ -695,6 +741,44 @@ static void cameras_lose_their_scale(void **state)
     assert_vec3(lx_mat4_point(scene->cameras[0].transform, lx_v3(0, 0, -1)), 1, 2, 2);
     assert_false(scene->cameras[1].perspective);
     assert_logged("warning: camera 2: its angles or extents make no picture");
+    lx_scene_destroy(scene);
+}
+
+static void byte_order_mark_and_zero_padding_are_forgiven(void **state)
+{
+    (void)state;
+    triangle_bin();
+    char *plain = make_gltf(TRIANGLE ONE_NODE);
+    char text[2048];
+    const int length = snprintf(text, sizeof text - 2, "\xef\xbb\xbf%s", plain);
+    text[length] = text[length + 1] = '\0';
+    lx_scene *scene;
+    lx_error error;
+    assert_int_equal(import_text(text, (size_t)length + 2, &scene, &error), LX_OK);
+    lx_scene_destroy(scene);
+    free(plain);
+}
+
+static void description_lists_lights_and_cameras(void **state)
+{
+    (void)state;
+    lx_scene *scene = import_triangle(",'extensionsUsed':['KHR_lights_punctual'],'extensions':{'KHR_lights_punctual':{'"
+                                      "lights':[{'type':'spot','range':3},{'type':'directional'}]}},"
+                                      "'cameras':[{'type':'perspective','perspective':{'yfov':0.5,'znear':1}},{'type':'"
+                                      "orthographic','orthographic':{'xmag':2,'ymag':2,'zfar':1,'znear':0}}],"
+                                      "'nodes':[{'mesh':0,'camera':0},{'camera':1},{'name':'stage','extensions':{'KHR_"
+                                      "lights_punctual':{'light':0}},'extras':{'luxel_layer':'show'}},"
+                                      "{'name':'sun','extensions':{'KHR_lights_punctual':{'light':1}},'extras':{'luxel_"
+                                      "radius':0.5}},{'name':'panel','extras':{'luxel_area':'rect 1 1'}}]");
+    char *text = NULL;
+    assert_int_equal(lx_scene_describe(scene, &text, NULL), LX_OK);
+    static const char *const parts[] = {
+        "\"name\": \"stage\"", "\"layer\": \"show\"",       "\"layer\": \"sun\"", "\"unit\": \"lx\"",
+        "\"range\": 3.0",      "\"outer_angle\": 0.785398", "\"axis_x\"",         "\"yfov\": 0.5",
+        "\"ymag\": 2.0",       "\"radius\": 0.008726"};
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; ++i)
+        if (!strstr(text, parts[i])) fail_msg("no %s in %s", parts[i], text);
+    lx_text_free(text);
     lx_scene_destroy(scene);
 }
 
@@ -747,8 +831,14 @@ int main(void)
         cmocka_unit_test(texture_set_beyond_those_read_is_replaced_with_a_warning),
         cmocka_unit_test(webp_source_is_preferred),
         cmocka_unit_test(texture_without_readable_source_is_white),
-        cmocka_unit_test(meshopt_views_are_decoded_and_filtered),
         cmocka_unit_test(cameras_lose_their_scale),
+        cmocka_unit_test(color_targets_may_have_three_or_four_channels),
+        cmocka_unit_test(morph_targets_that_overflow_are_refused),
+        cmocka_unit_test(long_lists_of_what_moves_are_cut),
+        cmocka_unit_test(bounds_of_very_many_triangles_come_from_boxes),
+        cmocka_unit_test(gpu_instances_with_unequal_counts_are_refused),
+        cmocka_unit_test(byte_order_mark_and_zero_padding_are_forgiven),
+        cmocka_unit_test(description_lists_lights_and_cameras),
         cmocka_unit_test(description_is_json_with_short_numbers),
     };
     return cmocka_run_group_tests_name("scene import", tests, fixture_setup, fixture_teardown);

@@ -221,16 +221,16 @@ static void area_that_makes_no_sense_is_ignored_with_a_warning(void **state)
 // Three triangles: materials 0, 1 and none; 0 and 1 emit.
 #define EMITTERS                                                                                                       \
     TRIANGLE_DATA                                                                                                      \
-        ",'materials':[{'name':'neon','emissiveFactor':[1,0,0]},{'emissiveFactor':[0,0.5,0],"                          \
-        "'extensions':{'KHR_materials_emissive_strength':{'emissiveStrength':12}}},{'name':'dark','emissiveFactor':["  \
-        "0,0,0]},"                                                                                                     \
-        "{'name':'off','emissiveFactor':[1,1,1],'extensions':{'KHR_materials_emissive_strength':{'emissiveStrength':"  \
-        "0}}}],"                                                                                                       \
-        "'meshes':[{'name':'sign','primitives':[{'attributes':{'POSITION':0},'material':0},{'attributes':{'POSITION':" \
-        "0},'material':1},"                                                                                            \
-        "{'attributes':{'POSITION':0}},{'attributes':{'POSITION':0},'material':0}]},"                                  \
-        "{'primitives':[{'attributes':{'POSITION':0},'material':0}]},"                                                 \
-        "{'primitives':[{'attributes':{'POSITION':0},'material':2},{'attributes':{'POSITION':0},'material':3}]}]"
+    ",'materials':[{'name':'neon','emissiveFactor':[1,0,0]},{'emissiveFactor':[0,0.5,0],"                              \
+    "'extensions':{'KHR_materials_emissive_strength':{'emissiveStrength':12}}},{'name':'dark','emissiveFactor':["      \
+    "0,0,0]},"                                                                                                         \
+    "{'name':'off','emissiveFactor':[1,1,1],'extensions':{'KHR_materials_emissive_strength':{'emissiveStrength':"      \
+    "0}}}],"                                                                                                           \
+    "'meshes':[{'name':'sign','primitives':[{'attributes':{'POSITION':0},'material':0},{'attributes':{'POSITION':"     \
+    "0},'material':1},"                                                                                                \
+    "{'attributes':{'POSITION':0}},{'attributes':{'POSITION':0},'material':0}]},"                                      \
+    "{'primitives':[{'attributes':{'POSITION':0},'material':0}]},"                                                     \
+    "{'primitives':[{'attributes':{'POSITION':0},'material':2},{'attributes':{'POSITION':0},'material':3}]}]"
 
 static void emitters_are_named_by_node_and_material(void **state)
 {
@@ -269,6 +269,24 @@ static void repeated_names_get_numbers(void **state)
     lx_scene_destroy(scene);
 }
 
+static void many_names_stay_unique(void **state)
+{
+    (void)state;
+    enum { count = 300 };
+    char *nodes = malloc(128 * count);
+    size_t length = (size_t)sprintf(nodes, LIGHTS("{'type':'point'}") ",'nodes':[{'mesh':0}");
+    for (int i = 0; i < count; ++i)
+        length += (size_t)sprintf(nodes + length, ",{'name':'lamp%d'," LAMP(0) "}", i % 100);
+    strcpy(nodes + length, "]");
+    lx_scene *scene = import_triangle(nodes);
+    free(nodes);
+    assert_int_equal(scene->source_count, count);
+    assert_string_equal(scene->sources[299].name, "lamp99#3");
+    for (uint32_t i = 0; i < scene->source_count; ++i)
+        assert_ptr_equal(source_named(scene, scene->sources[i].name), &scene->sources[i]);
+    lx_scene_destroy(scene);
+}
+
 static void gpu_instances_of_an_emitter_are_one_source(void **state)
 {
     (void)state;
@@ -291,38 +309,39 @@ static void keys_are_inherited_and_the_nearest_wins(void **state)
         "{'type':'point','extras':{'luxel_layer':'light','luxel_mode':'mixed'}}") ",'nodes':[{'name':'hall','extras':{'"
                                                                                   "luxel_layer':'hall','luxel_density':"
                                                                                   "2},'children':[1,2,3]},"
-                                                                                  "{'name':'a'," LAMP(0) "},{'name':'b'"
-                                                                                                         "," LAMP(
-                                                                                                             0) ",'"
-                                                                                                                "extras"
-                                                                                                                "':{'"
-                                                                                                                "luxel_"
-                                                                                                                "layer'"
-                                                                                                                ":'b','"
-                                                                                                                "luxel_"
-                                                                                                                "mode':"
-                                                                                                                "'baked"
-                                                                                                                "'}},"
-                                                                                                                "{'"
-                                                                                                                "childr"
-                                                                                                                "en':["
-                                                                                                                "4]},{'"
-                                                                                                                "name':"
-                                                                                                                "'m','"
-                                                                                                                "mesh':"
-                                                                                                                "0,'"
-                                                                                                                "extras"
-                                                                                                                "':{'"
-                                                                                                                "luxel_"
-                                                                                                                "scale_"
-                                                                                                                "in_"
-                                                                                                                "lightm"
-                                                                                                                "ap':0."
-                                                                                                                "5}},{'"
-                                                                                                                "name':"
-                                                                                                                "'c'"
-                                                                                                                "," LAMP(
-                                                                                                                    0) "},{'mesh':0}]");
+                                                                                  "{'name':'a'," LAMP(
+                                                                                      0) "},{'name':'b'"
+                                                                                         "," LAMP(
+                                                                                             0) ",'"
+                                                                                                "extras"
+                                                                                                "':{'"
+                                                                                                "luxel_"
+                                                                                                "layer'"
+                                                                                                ":'b','"
+                                                                                                "luxel_"
+                                                                                                "mode':"
+                                                                                                "'baked"
+                                                                                                "'}},"
+                                                                                                "{'"
+                                                                                                "childr"
+                                                                                                "en':["
+                                                                                                "4]},{'"
+                                                                                                "name':"
+                                                                                                "'m','"
+                                                                                                "mesh':"
+                                                                                                "0,'"
+                                                                                                "extras"
+                                                                                                "':{'"
+                                                                                                "luxel_"
+                                                                                                "scale_"
+                                                                                                "in_"
+                                                                                                "lightm"
+                                                                                                "ap':0."
+                                                                                                "5}},{'"
+                                                                                                "name':"
+                                                                                                "'c'"
+                                                                                                "," LAMP(
+                                                                                                    0) "},{'mesh':0}]");
     assert_string_equal(source_named(scene, "a")->layer, "hall"); // node goes before light
     assert_int_equal(source_named(scene, "a")->mode, LX_MODE_MIXED);
     assert_int_equal(source_named(scene, "a")->parent_node, 0);
@@ -497,6 +516,9 @@ static void blender_users_are_told_about_export_boxes(void **state)
     import_from_blender(LIGHTS("{'type':'point'}") ",'nodes':[{'mesh':0,'extras':{'luxel_density':2}},{" LAMP(0) "}]");
     assert_not_logged("Punctual Lights");
     assert_not_logged("Custom Properties");
+    import_from_blender(",'nodes':[{'mesh':0,'extras':{'mine':2}}]"); // the box was ticked
+    assert_logged("Punctual Lights");
+    assert_not_logged("Custom Properties");
 }
 
 static void strange_sizes_get_a_warning(void **state)
@@ -536,6 +558,7 @@ int main(void)
         cmocka_unit_test(area_that_makes_no_sense_is_ignored_with_a_warning),
         cmocka_unit_test(emitters_are_named_by_node_and_material),
         cmocka_unit_test(repeated_names_get_numbers),
+        cmocka_unit_test(many_names_stay_unique),
         cmocka_unit_test(gpu_instances_of_an_emitter_are_one_source),
         cmocka_unit_test(keys_are_inherited_and_the_nearest_wins),
         cmocka_unit_test(material_keys_apply_where_nodes_say_nothing),
