@@ -9,7 +9,8 @@
 #include "trace/sampling.h"
 #include "trace/tracer_data.h"
 
-enum { max_grid = 64, lookups_per_edge = 3 };
+enum { max_grid = 64, least_lookups = 3, most_lookups = 16 }; // lookups: per edge of a piece
+static const float lookup_budget = 1 << 24; // for a surface, beyond the least: some tenths of a second
 static const float least_share = 0.02f; // of a triangle's mean brightness, for every piece
 
 static float brightness_of(lx_rgb c)
@@ -32,13 +33,13 @@ static bool piece_is_inside(uint32_t grid, uint32_t i, uint32_t j, uint32_t k)
 }
 
 static float mean_brightness(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, uint32_t grid, uint32_t i,
-                             uint32_t j, uint32_t k)
+                             uint32_t j, uint32_t k, uint32_t lookups)
 {
     // Centres of a small grid folded into the triangle.
     float sum = 0;
-    for (int y = 0; y < lookups_per_edge; ++y)
-        for (int x = 0; x < lookups_per_edge; ++x) {
-            float a = ((float)x + 0.5f) / lookups_per_edge, b = ((float)y + 0.5f) / lookups_per_edge;
+    for (uint32_t y = 0; y < lookups; ++y)
+        for (uint32_t x = 0; x < lookups; ++x) {
+            float a = ((float)x + 0.5f) / (float)lookups, b = ((float)y + 0.5f) / (float)lookups;
             if (a + b > 1) {
                 a = 1 - a;
                 b = 1 - b;
@@ -46,20 +47,20 @@ static float mean_brightness(const lx_tracer *tracer, uint32_t surface, uint32_t
             const lx_vec2 uv = piece_point(grid, i, j, k, a, b);
             sum += brightness_of(lx_surface_emission(tracer, surface, triangle, uv.x, uv.y));
         }
-    return sum / (lookups_per_edge * lookups_per_edge);
+    return sum / (float)(lookups * lookups);
 }
 
-// Texels along the longest edge of the triangle in its emissive texture, halved.
-static uint32_t choose_grid(const lx_tracer *tracer, uint32_t surface, uint32_t triangle)
+// Texels along the longest edge of the triangle in its emissive texture.
+static float texels_across(const lx_tracer *tracer, uint32_t surface, uint32_t triangle)
 {
     const lx_scene *scene = tracer->scene;
     const lx_surface *s = &scene->surfaces[surface];
     const lx_texture_slot *slot = &scene->materials[s->material].emissive_texture;
-    if (slot->texture < 0 || scene->textures[slot->texture].image < 0) return 1;
+    if (slot->texture < 0 || scene->textures[slot->texture].image < 0) return 0;
     const lx_image *image = &scene->images[scene->textures[slot->texture].image];
     const lx_primitive *primitive = &scene->primitives[s->primitive];
     const lx_vec2 *uvs = primitive->texcoords[slot->texcoord];
-    if (!uvs) return 1;
+    if (!uvs) return 0;
     const uint32_t *corner = primitive->indices + 3 * (size_t)triangle;
     float longest = 0;
     for (int e = 0; e < 3; ++e) {
@@ -68,17 +69,29 @@ static uint32_t choose_grid(const lx_tracer *tracer, uint32_t surface, uint32_t 
         const float dv = (slot->m[3] * d.x + slot->m[4] * d.y) * (float)image->height;
         longest = lx_max(longest, sqrtf(du * du + dv * dv));
     }
-    const float pieces = ceilf(longest * 0.5f);
-    return pieces < 1 ? 1 : pieces < max_grid ? (uint32_t)pieces : (uint32_t)max_grid;
+    return longest;
+}
+
+// Pieces of two texels across.
+static uint32_t choose_grid(float texels)
+{
+    return (uint32_t)lx_clamp(ceilf(texels * 0.5f), 1, max_grid);
+}
+
+// So many that no texel of a large picture is overlooked, as far as the budget goes.
+static uint32_t choose_lookups(float texels, uint32_t grid, uint32_t triangle_count)
+{
+    const float affordable = sqrtf(lookup_budget / ((float)triangle_count * (float)(grid * grid)));
+    return (uint32_t)lx_clamp(lx_min(ceilf(texels / (float)grid), affordable), least_lookups, most_lookups);
 }
 
 // Fills the piece table of one triangle; returns its mean brightness.
 static lx_result build_pieces(const lx_tracer *tracer, lx_emitters *emitters, size_t *capacity, lx_emitter_triangle *t,
-                              float *out_mean, lx_error *error)
+                              uint32_t lookups, float *out_mean, lx_error *error)
 {
     const uint32_t n = t->grid;
     if (n == 1) {
-        *out_mean = mean_brightness(tracer, t->surface, t->triangle, 1, 0, 0, 0);
+        *out_mean = mean_brightness(tracer, t->surface, t->triangle, 1, 0, 0, 0, lookups);
         return LX_OK;
     }
     const size_t entries = 2 * (size_t)n * n;
@@ -92,7 +105,9 @@ static lx_result build_pieces(const lx_tracer *tracer, lx_emitters *emitters, si
     for (uint32_t i = 0, e = 0; i < n; ++i)
         for (uint32_t j = 0; j < n; ++j)
             for (uint32_t k = 0; k < 2; ++k, ++e) {
-                cdf[e + 1] = piece_is_inside(n, i, j, k) ? mean_brightness(tracer, t->surface, t->triangle, n, i, j, k) : 0;
+                cdf[e + 1] = 0;
+                if (piece_is_inside(n, i, j, k))
+                    cdf[e + 1] = mean_brightness(tracer, t->surface, t->triangle, n, i, j, k, lookups);
                 sum += (double)cdf[e + 1];
             }
     const double mean = sum / ((double)n * n); // n² pieces lie inside
@@ -128,9 +143,11 @@ static lx_result add_surface(lx_tracer *tracer, lx_emitters *emitters, size_t *t
         lx_triangle_corners(tracer, surface, i, p);
         *t = (lx_emitter_triangle){.surface = surface, .triangle = i};
         t->area = 0.5f * lx_length(lx_cross(lx_sub(p[1], p[0]), lx_sub(p[2], p[0])));
-        t->grid = t->area > 0 ? choose_grid(tracer, surface, i) : 1;
+        const float texels = t->area > 0 ? texels_across(tracer, surface, i) : 0;
+        t->grid = choose_grid(texels);
+        const uint32_t lookups = choose_lookups(texels, t->grid, primitive->triangle_count);
         float mean = 0;
-        const lx_result result = build_pieces(tracer, emitters, piece_capacity, t, &mean, error);
+        const lx_result result = build_pieces(tracer, emitters, piece_capacity, t, lookups, &mean, error);
         if (result != LX_OK) return result;
         t->probability = mean * t->area; // power for now; divided by the source's below
     }
