@@ -295,9 +295,17 @@ static void export_split_reindexes_morph_targets(void **state)
     const int normal = add_accessor(f, type_i16, "VEC3", 4, turned, sizeof turned, 8);
     normalize(f, normal);
     const int zeros = push(f, "accessors", json_pack("{sisiss}", "componentType", type_f32, "count", 4, "type", "VEC3"));
-    json_object_set_new(primitive, "targets", json_pack("[{sisi}{si}]", "POSITION", position, "NORMAL", normal, "POSITION", zeros));
+    static const uint8_t where[] = {2};
+    static const float what[] = {0, 8, 0};
+    const int where_view = add_view(f, where, sizeof where), what_view = add_view(f, what, sizeof what);
+    const int sparse = push(f, "accessors", json_deep_copy(accessor_of(f->document, zeros)));
+    json_object_set_new(accessor_of(f->document, sparse), "sparse",
+                        json_pack("{sis{sisi}s{si}}", "count", 1, "indices", "bufferView", where_view, "componentType", type_u8,
+                                  "values", "bufferView", what_view));
+    json_object_set_new(primitive, "targets", json_pack("[{sisi}{si}{si}]", "POSITION", position, "NORMAL", normal, "POSITION", zeros,
+                                                        "POSITION", sparse));
     const int mesh = add_mesh(f, primitive);
-    json_object_set_new(item(f->document, "meshes", (size_t)mesh), "weights", parse("[0.5, 0.25]"));
+    json_object_set_new(item(f->document, "meshes", (size_t)mesh), "weights", parse("[0.5, 0.25, 0.125]"));
     trip t = round_trip(f, 0, by_triangle); // the importer adds the targets: positions of both scenes tell whether they fit
     json_t *targets = json_object_get(primitive_of(t.document, 0, 0), "targets");
     json_t *first = accessor_of(t.document, number_in(json_array_get(targets, 0), "NORMAL"));
@@ -305,7 +313,7 @@ static void export_split_reindexes_morph_targets(void **state)
     assert_int_equal(number_in(first, "componentType"), type_i16);
     assert_int_equal(number_in(second, "count"), 6);
     assert_null(json_object_get(second, "bufferView"));
-    assert_true(t.before->primitives[0].positions[2].y == 1.5f);
+    assert_true(t.before->primitives[0].positions[2].y == 2.5f);
     assert_same_corners(&t);
     end_trip(&t);
 }

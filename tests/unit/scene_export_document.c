@@ -226,6 +226,24 @@ static void export_keeps_overlapping_views_overlapping(void **state)
     end_trip(&t);
 }
 
+static void export_keeps_the_alignment_of_views_that_touch(void **state)
+{
+    (void)state;
+    file *f = quad_file("[{\"mesh\":0}]");
+    memmove(f->bin + 4, f->bin, f->size); // two spare bytes, two that have a view, then what was there
+    f->size += 4;
+    for (size_t i = 0; i < 2; ++i) {
+        json_t *view = item(f->document, "bufferViews", i);
+        json_object_set_new(view, "byteOffset", json_integer(4 + number_in(view, "byteOffset")));
+    }
+    push(f, "bufferViews", parse("{\"buffer\":0,\"byteOffset\":2,\"byteLength\":2}"));
+    trip t = round_trip(f, 0, by_vertex);
+    assert_int_equal(number_in(item(t.document, "bufferViews", 0), "byteOffset"), 4);
+    assert_int_equal(number_in(item(t.document, "bufferViews", 2), "byteOffset"), 2);
+    assert_same_corners(&t);
+    end_trip(&t);
+}
+
 // ---- other files
 
 static const char png_base64[] =
@@ -339,6 +357,7 @@ int main(void)
         cmocka_unit_test(export_keeps_accessors_that_the_input_did_not_use),
         cmocka_unit_test(export_drops_bytes_that_nothing_refers_to),
         cmocka_unit_test(export_keeps_overlapping_views_overlapping),
+        cmocka_unit_test(export_keeps_the_alignment_of_views_that_touch),
         cmocka_unit_test(export_embeds_buffers_and_images_from_other_files),
         cmocka_unit_test(export_of_an_export_is_the_same_file),
         cmocka_unit_test(export_without_memory_for_the_document_fails_cleanly),
