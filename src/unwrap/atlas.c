@@ -43,6 +43,7 @@ static lx_result check_desc(const lx_atlas_desc *desc, lx_error *error)
 static bool report(void *user, const lx_progress *progress)
 {
     lx_unwrap_job *job = user;
+    if (atomic_load(&job->stop)) return false; // said once is enough
     if (!job->sink || !job->sink->func) return true;
     const lx_progress whole = {.stage = "unwrap",
                                .fraction = job->progress_low + (job->progress_high - job->progress_low) * progress->fraction,
@@ -62,6 +63,7 @@ lx_result lx_unwrap_run(lx_unwrap_job *job, lx_task task, double to, lx_error *e
     job->progress_low = job->progress_high;
     job->progress_high = to;
     LX_TRY(lx_pool_run_weighted(job->scene->context->pool, job->mesh_count, weights, task, job, "unwrap", &sink, error));
+    if (atomic_load(&job->stop)) LX_TRY(lx_fail(error, LX_ERROR_CANCELLED, "cancelled")); // after the last task
 cleanup:
     lx_free(weights);
     return result;
@@ -199,7 +201,7 @@ static void keep_scene_atlas(lx_unwrap_job *job)
 }
 
 // A chart longer than a page would keep the density of the whole scene down. At the asked density, or at the one that would
-// use every texel, it has to fit; a square that fills the page by itself just does.
+// use three quarters of the texels, it has to fit; so does a square or a disk that has the page to itself.
 static double longest_chart(const lx_unwrap_job *job)
 {
     const double page = (double)job->desc.page_size, border = (job->desc.padding + 1) / 2;
@@ -210,7 +212,7 @@ static double longest_chart(const lx_unwrap_job *job)
             const double size = job->meshes[m].size * (double)job->ratios[job->instances[job->meshes[m].first_instance + i]];
             area += size * size;
         }
-    return 1.02 * sqrt(area / job->desc.max_pages);
+    return 1.15 * sqrt(area / job->desc.max_pages);
 }
 
 static void warn_of_flaws(const lx_unwrap_job *job)

@@ -277,21 +277,30 @@ static bool sheet_init(sheet *s, uint32_t width, uint32_t height, uint32_t longe
     return true;
 }
 
-// blocked |= row moved left by `shift`; true if nothing is free any more.
-static bool block(uint64_t *blocked, uint32_t words, const uint64_t *row, uint32_t shift)
+// The words of `blocked` that still have a free column.
+typedef struct range { uint32_t first, end; } range;
+
+static range shrink(const uint64_t *blocked, range r)
 {
-    const uint32_t whole = shift / 64, bits = shift % 64;
-    uint64_t all = ~UINT64_C(0);
-    const uint32_t kept = whole < words ? words - whole : 0;
+    while (r.first < r.end && blocked[r.first] == ~UINT64_C(0)) ++r.first;
+    while (r.end > r.first && blocked[r.end - 1] == ~UINT64_C(0)) --r.end;
+    return r;
+}
+
+// blocked |= row moved left by `shift`, within the range; what comes in from beyond the row is taken.
+static range block(uint64_t *blocked, range r, const uint64_t *row, uint32_t words, uint32_t shift)
+{
+    const uint32_t whole = shift / 64, bits = shift % 64, kept = whole < words ? words - whole : 0;
+    if (r.end > kept) r.end = kept > r.first ? kept : r.first; // beyond: nothing free
+    const uint32_t inner = r.end + whole < words ? r.end : r.end > r.first ? r.end - 1 : r.end;
+    const uint64_t *from = row + whole;
     if (bits == 0) {
-        for (uint32_t w = 0; w < kept; ++w) all &= blocked[w] |= row[w + whole];
+        for (uint32_t w = r.first; w < r.end; ++w) blocked[w] |= from[w];
     } else {
-        for (uint32_t w = 0; w + 1 < kept; ++w)
-            all &= blocked[w] |= row[w + whole] >> bits | row[w + whole + 1] << (64 - bits);
-        if (kept) all &= blocked[kept - 1] |= row[words - 1] >> bits | ~UINT64_C(0) << (64 - bits);
+        for (uint32_t w = r.first; w < inner; ++w) blocked[w] |= from[w] >> bits | from[w + 1] << (64 - bits);
+        if (inner < r.end) blocked[inner] |= from[inner] >> bits | ~UINT64_C(0) << (64 - bits);
     }
-    for (uint32_t w = kept; w < words; ++w) blocked[w] = ~UINT64_C(0);
-    return all == ~UINT64_C(0);
+    return shrink(blocked, r);
 }
 
 // The lowest, then leftmost place for `s`, from row `y` on, at least `border` from the sheet's rim, with its top not above
@@ -310,18 +319,17 @@ static bool find_place(sheet *on, const shape *s, uint32_t border, uint32_t y, u
         memset(on->blocked, 0, words * sizeof *on->blocked);
         set_run(on->blocked, 0, border);
         set_run(on->blocked, last_x + 1, words * 64);
-        bool full = false;
-        for (size_t i = 0; i < s->run_count && !full; ++i) {
+        range open = shrink(on->blocked, (range){0, words});
+        for (size_t i = 0; i < s->run_count && open.first < open.end; ++i) {
             const run r = s->runs[i];
             uint32_t level = 31u - (uint32_t)__builtin_clz(r.length);
             if (level >= on->levels) level = on->levels - 1;
             const uint64_t *row = sheet_row(on, level, y + r.y);
-            full = block(on->blocked, words, row, r.x);
-            if (!full && r.length > 1u << level) full = block(on->blocked, words, row, r.x + r.length - (1u << level));
+            open = block(on->blocked, open, row, words, r.x);
+            if (r.length > 1u << level) open = block(on->blocked, open, row, words, r.x + r.length - (1u << level));
         }
-        if (full) continue;
-        for (uint32_t w = 0; w < words; ++w) {
-            if (on->blocked[w] == ~UINT64_C(0)) continue;
+        if (open.first < open.end) {
+            const uint32_t w = open.first; // shrink() left a free column in it
             *out_x = w * 64 + (uint32_t)__builtin_ctzll(~on->blocked[w]);
             *out_y = y;
             return true;

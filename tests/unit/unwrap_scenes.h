@@ -282,8 +282,12 @@ typedef struct page_map { uint32_t *owner; uint32_t cells, per_texel; } page_map
 static inline void draw_triangle(page_map *touched, uint32_t *claims, const placed *t, uint32_t gid, uint32_t triangle)
 {
     const double k = touched->per_texel, area2 = 2 * placed_area(t) * k * k, sign = area2 > 0 ? 1 : -1;
-    double lx = INFINITY, ly = INFINITY, hx = -INFINITY, hy = -INFINITY;
+    double lx = INFINITY, ly = INFINITY, hx = -INFINITY, hy = -INFINITY, nx[3], ny[3];
     for (int i = 0; i < 3; ++i) {
+        const int n = i == 2 ? 0 : i + 1;
+        const double length = hypot(t->x[n] - t->x[i], t->y[n] - t->y[i]);
+        nx[i] = -sign * (t->y[n] - t->y[i]) / length;
+        ny[i] = sign * (t->x[n] - t->x[i]) / length;
         lx = fmin(lx, t->x[i] * k);
         hx = fmax(hx, t->x[i] * k);
         ly = fmin(ly, t->y[i] * k);
@@ -294,11 +298,9 @@ static inline void draw_triangle(page_map *touched, uint32_t *claims, const plac
             if (x < 0 || y < 0 || x >= touched->cells || y >= touched->cells) continue;
             bool center = true, touch = true;
             for (int i = 0; i < 3; ++i) {
-                const int n = i == 2 ? 0 : i + 1;
-                const double ex = (t->x[n] - t->x[i]) * k, ey = (t->y[n] - t->y[i]) * k, length = hypot(ex, ey);
-                const double d = sign * (ex * ((double)y + 0.5 - t->y[i] * k) - ey * ((double)x + 0.5 - t->x[i] * k)) / length;
+                const double d = nx[i] * ((double)x + 0.5 - t->x[i] * k) + ny[i] * ((double)y + 0.5 - t->y[i] * k);
                 center &= d > 1e-3;
-                touch &= d > -0.5 * (fabs(ex) + fabs(ey)) / length + 2e-2;
+                touch &= d > -0.5 * (fabs(nx[i]) + fabs(ny[i])) + 2e-2;
             }
             const size_t c = (size_t)y * touched->cells + (size_t)x;
             if (touch) touched->owner[c] = gid + 1;
