@@ -5,7 +5,7 @@
     analytic.py LUXEL [CASE...]         runs them with this program
     analytic.py LUXEL --table [CASE...] the same, as the table of docs/accuracy.md
 
-A case is a function of lamps.py, emitters.py, skies.py, panes.py, bounces.py or bakes.py. It makes a scene, lets Luxel compute
+A case is a function of selftest.py, lamps.py, emitters.py, skies.py, panes.py, bounces.py or bakes.py. It makes a scene, lets Luxel compute
 irradiance in it, and compares with what oracle.py says, which shares nothing with Luxel's sources. Seeds are fixed: a case passes
 always or never.
 """
@@ -17,7 +17,7 @@ import tempfile
 import time
 
 import measure
-import lamps, emitters, skies, panes, bounces
+import selftest, lamps, emitters, skies, panes, bounces, bakes, convergence
 
 
 def number(value):

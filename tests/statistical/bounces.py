@@ -35,7 +35,9 @@ def white_furnace_reaches_its_geometric_sum():
     for albedo in (0.2, 0.5, 0.8):
         expected = 5 * math.pi / (1 - albedo)
         got = irradiance(furnace((albedo,) * 3), points_on_walls(), 16384, "inf")
-        compare("pi L / (1 - %g)" % albedo, grey([expected] * 5), got, 0.01, 16384)
+        # Paths of random length spread by up to 0.8 of their mean: 0.6 % after 16384 of them; and three times that.
+        compare("pi L / (1 - %g), each point" % albedo, grey([expected] * 5), got, 0.02, 16384)
+        compare_mean("pi L / (1 - %g), mean" % albedo, expected, [g[0] for g in got], 0.01, 16384)
 
 
 @case
@@ -251,9 +253,9 @@ def points_near_edges(near):
 
 def stays_dark(scene, points, what):
     got = [max(g) for g in irradiance(scene, points, 4096, 4, "--sky", "10,10,10")]
-    # Of a million vertices one or two round onto an edge itself, from where both sides can be seen.
-    below(what + ", any point, of 100 lux", 5e-3, [g / 100 for g in got], 4096)
-    below(what + ", mean, of 100 lux", 5e-5, [sum(got) / len(got) / 100], 4096)
+    # Floats round some vertices of paths onto an edge itself, or past it: of a million, one or two.
+    below(what + ", any point, of 100 lux", 1e-3, [g / 100 for g in got], 4096)
+    below(what + ", mean, of 100 lux", 1e-5, [math.fsum(got) / len(got) / 100], 4096)
 
 
 @case
@@ -262,7 +264,7 @@ def closed_dark_box_lets_no_light_in():
     white = scene.add_material("white", base_color=(0.8, 0.8, 0.8))
     inward_box(lambda _: white, scene)
     lamps_around(scene, (0, 0, 0))
-    stays_dark(scene, points_near_edges((1e-5, 1e-4, 1e-3, 0.01, 0.5, 1.0)), "walls without thickness")
+    stays_dark(scene, points_near_edges((1e-4, 1e-3, 0.01, 0.5, 1.0)), "walls without thickness")
 
 
 @case
@@ -272,7 +274,7 @@ def closed_box_turned_askew_lets_no_light_in():
     shape = box(2, 2, 2).flip().rotate_quat(turn).translate(*place)
     scene.add_node("box", mesh=scene.add_mesh("box", (shape, white)))
     lamps_around(scene, place)
-    points = [(v_add(place, quat_rotate(turn, p)), quat_rotate(turn, n)) for p, n in points_near_edges((1e-5, 1e-4, 1e-3, 0.01, 0.5))]
+    points = [(v_add(place, quat_rotate(turn, p)), quat_rotate(turn, n)) for p, n in points_near_edges((1e-3, 0.01, 0.5))]
     stays_dark(scene, points, "slanted walls")
 
 

@@ -159,15 +159,19 @@ class SkyPicture:
         totals = [0.0] * len(normals)
         n, m = self.width * steps, self.height * steps
         c, s = math.cos(self.rotation), math.sin(self.rotation)
+        shines = [[any(self.rows[min(self.height - 1, max(0, j + b))][(i + a) % self.width] for b in (-1, 0, 1) for a in (-1, 0, 1))
+                   for i in range(self.width)] for j in range(self.height)]
         for j in range(m):
+            if not any(shines[j // steps]):
+                continue
             v = (j + 0.5) / m
             y, ring = math.cos(v * math.pi), math.sin(v * math.pi)
             area = 2 * math.pi / n * (math.cos(j / m * math.pi) - math.cos((j + 1) / m * math.pi))
             for i in range(n):
+                if not shines[j // steps][i // steps]:
+                    continue
                 u = (i + 0.5) / n
                 light = self.value(u, v)
-                if light == 0:
-                    continue
                 around = (u - 0.5) * 2 * math.pi
                 x, z = ring * math.cos(around), ring * math.sin(around)
                 d = (c * x + s * z, y, c * z - s * x)  # a turn about +Y takes +Z towards +X
