@@ -43,11 +43,13 @@ lx_result lx_host_check_input(const char *path, lx_error *error)
 lx_result lx_host_check_output(const char *path, lx_error *error)
 {
     if (!*path) return lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "the output file has an empty name");
-    if (lx_path_is_folder(path)) return lx_fail(error, LX_ERROR_IO, "%s: cannot write: is a folder", path);
+    if (lx_path_is_folder(path)) return lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "%s: cannot write: is a folder", path);
     lx_result result = LX_OK;
     char *folder = lx_path_folder(path);
     if (!folder) return lx_fail_memory(error, "path");
-    if (access(folder, W_OK | X_OK) != 0)
+    if (!lx_path_is_folder(folder))
+        result = lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "%s: cannot write: there is no folder %s", path, folder);
+    else if (access(folder, W_OK | X_OK) != 0)
         result = lx_fail(error, LX_ERROR_IO, "%s: cannot write: folder %s: %s", path, folder, strerror(errno));
     lx_free(folder);
     return result;

@@ -31,7 +31,7 @@ static void format_value(char out[cell_size], const json_t *value)
         break;
     }
     case JSON_INTEGER: snprintf(out, cell_size, "%lld", (long long)json_integer_value(value)); break;
-    case JSON_REAL: snprintf(out, cell_size, "%.5g", json_real_value(value)); break;
+    case JSON_REAL: snprintf(out, cell_size, "%.5g", json_real_value(value) + 0.0); break; // + 0.0: no "-0"
     case JSON_TRUE: append(out, "yes"); break;
     case JSON_FALSE: append(out, "no"); break;
     case JSON_NULL: append(out, "-"); break;

@@ -11,6 +11,7 @@ also that it failed with one good line.
 import json
 import os
 import pty
+import select
 import signal
 import struct
 import sys
@@ -135,7 +136,7 @@ def broken(data, says):
         write("out.baked/mine.txt", "keep me")
         before = tree(".")
         for out in ("fresh.baked", "out.baked"):
-            refused("bake", "in/bad.glb", "-o", out, "--quiet", code=1, says=["luxel: in/bad.glb: ", *says])
+            refused("bake", "in/bad.glb", "-o", out, *FAST, code=1, says=["luxel: in/bad.glb: ", *says])
         refused("inspect", "in/bad.glb", code=1, says=["luxel: in/bad.glb: ", *says])
         expect(tree(".") == before, "files changed: %s" % sorted(tree(".")))
         expect(sorted(os.listdir(".")) == ["in", "out.baked", "secret.bin"], "left behind: %s" % os.listdir("."))
@@ -165,6 +166,14 @@ def input_truncated_anywhere():
         write("cut.glb", good[:len(good) * part // 24])
         refused("bake", "cut.glb", "-o", "out", "--quiet", code=1, says=["luxel: cut.glb: "])
     expect(os.listdir(".") == ["cut.glb"], "left behind: %s" % os.listdir("."))
+
+
+@case
+def input_negative_light_is_a_warning():
+    def darken(j):
+        scenes.light(j, 0).update(intensity=-3)
+    write("room.glb", scenes.edited(darken))
+    luxel("bake", "room.glb", "-o", "out", *FAST, "--no-preview", err="luxel: warning: *'lamp'*negative*")
 
 
 @case
@@ -208,7 +217,7 @@ def output_folder_of_others_is_never_replaced():
 
 @case
 def output_below_missing_folder_is_refused_early():
-    result = luxel("bake", "nowhere.glb", "-o", "a/b/c", code=3, out="")
+    result = luxel("bake", "nowhere.glb", "-o", "a/b/c", code=2, out="")
     expect("a/b" in result.err and "nowhere.glb" not in result.err, result.err)
     expect(os.listdir(".") == [], "left behind: %s" % os.listdir("."))
 
@@ -216,7 +225,7 @@ def output_below_missing_folder_is_refused_early():
 @case
 def output_picture_below_missing_folder_is_refused_early():
     write("room.glb", scenes.GOOD)
-    refused("render", "room.glb", "-o", "a/b.png", code=3, says=["a/b.png", "folder a"])
+    refused("render", "room.glb", "-o", "a/b.png", code=2, says=["a/b.png", "folder a"])
 
 
 @case
@@ -294,7 +303,7 @@ def bake_same_bytes_for_any_number_of_threads():
     def content(folder):
         files = tree(folder)
         manifest = json.loads(read(folder + "/luxel.json"))
-        del files["luxel.json"], manifest["bake"]["seconds"]
+        del files["luxel.json"], manifest["bake"]["seconds"], manifest["bake"]["threads"]
         return files, manifest
 
     for threads in ("2", "3"):
@@ -517,6 +526,8 @@ def interrupt(arguments, stage, number):
             process.kill()
             process.wait()
             raise Failed("not stopped: %s" % screen[-2000:])
+        if not select.select([terminal], [], [], 1.0)[0]:
+            continue
         try:
             data = os.read(terminal, 4096)
         except OSError:  # the far end was closed: the process is over
@@ -536,7 +547,8 @@ def interrupt_stops_cleanly():
     bake()
     before = tree(".")
     for number in (signal.SIGINT, signal.SIGTERM):
-        code, screen = interrupt(["bake", "room.glb", "-o", "room.baked", "--samples", "1000000", "--page-size", "256"],
+        # Enough texels to take minutes, few enough samples that a tile, which is finished first, takes a moment.
+        code, screen = interrupt(["bake", "room.glb", "-o", "room.baked", "--samples", "1000", "--page-size", "2048"],
                                  b"bake ", number)
         expect(code == 130, "exit code %d: %s" % (code, screen))
         expect("stopped" in screen, screen)
@@ -547,7 +559,7 @@ def interrupt_stops_cleanly():
 @case
 def interrupt_stops_a_render():
     write("room.glb", scenes.GOOD)
-    code, screen = interrupt(["render", "room.glb", "-o", "a.png", "--samples", "1000000"], b"%", signal.SIGINT)
+    code, screen = interrupt(["render", "room.glb", "-o", "a.png", "--samples", "1000", "--size", "4000x4000"], b"%", signal.SIGINT)
     expect(code == 130, "exit code %d: %s" % (code, screen))
     expect(os.listdir(".") == ["room.glb"], "left behind: %s" % os.listdir("."))
 
