@@ -160,7 +160,8 @@ lx_result lx_emitters_build(lx_tracer *tracer, lx_error *error)
     lx_emitters *emitters = &tracer->emitters;
     size_t triangle_capacity = 0, piece_capacity = 0;
     emitters->first_triangle = lx_calloc_array((size_t)scene->source_count + 1, sizeof(uint32_t));
-    if (!emitters->first_triangle) return lx_fail_memory(error, "emitters");
+    emitters->source_power = lx_calloc_array(scene->source_count, sizeof(float));
+    if (!emitters->first_triangle || !emitters->source_power) return lx_fail_memory(error, "emitters");
     for (uint32_t source = 0; source < scene->source_count; ++source) {
         emitters->first_triangle[source] = (uint32_t)emitters->triangle_count;
         if (scene->sources[source].kind != LX_SOURCE_EMISSIVE) continue;
@@ -177,6 +178,7 @@ lx_result lx_emitters_build(lx_tracer *tracer, lx_error *error)
         const uint32_t first = emitters->first_triangle[source], end = emitters->first_triangle[source + 1];
         double total = 0;
         for (uint32_t i = first; i < end; ++i) total += (double)emitters->triangles[i].probability;
+        emitters->source_power[source] = (float)total;
         float *cdf = emitters->triangle_cdf + first + source;
         double running = 0;
         for (uint32_t i = first; i < end; ++i) {
@@ -195,6 +197,7 @@ void lx_emitters_release(lx_emitters *emitters)
     lx_free(emitters->triangle_cdf);
     lx_free(emitters->piece_cdf);
     lx_free(emitters->first_triangle);
+    lx_free(emitters->source_power);
     *emitters = (lx_emitters){0};
 }
 

@@ -19,6 +19,7 @@ typedef struct lx_emitters {
     float *triangle_cdf;            ///< [triangle_count + source_count]; per source its triangles' running sum, starting at 0.
     float *piece_cdf;
     uint32_t *first_triangle;       ///< [source_count + 1]
+    float *source_power;            ///< [source_count] sum of area × mean texture brightness, m²; 0 for sources that are not emissive.
     size_t triangle_count, piece_count;
 } lx_emitters;
 

@@ -181,6 +181,27 @@ static bool sample_emissive(const lx_tracer *tracer, uint32_t source, const lx_r
     return true;
 }
 
+// The sphere around a source against the receiver's horizons and the source's reach.
+float lx_source_bound(const lx_tracer *tracer, uint32_t source, const lx_receiver *receiver)
+{
+    const lx_source_sphere *s = &tracer->source_spheres[source];
+    if (!(s->power < INFINITY)) return INFINITY;
+    const lx_vec3 to_centre = lx_sub(s->centre, receiver->position);
+    const float along = lx_dot(to_centre, receiver->normal), upright = lx_dot(to_centre, receiver->geometric_normal);
+    if (along <= -s->radius || upright <= -s->radius) return 0;
+    const float distance = lx_length(to_centre), nearest = distance - s->radius;
+    if (!(nearest > 0)) return INFINITY;
+    const lx_source *described = lx_tracer_source(tracer, source);
+    if (described->light >= 0) {
+        const lx_light *light = &tracer->scene->lights[described->light];
+        if (light->range > 0 && distance >= light->range) return 0;
+        const float facing = -lx_dot(light->direction, to_centre);
+        if (light->kind == LX_LIGHT_SPOT && facing < s->cos_outer * distance) return 0;
+        if ((light->kind == LX_LIGHT_RECT || light->kind == LX_LIGHT_DISK) && !(facing > 0)) return 0;
+    }
+    return s->power / (nearest * nearest);
+}
+
 static bool sample_sky(const lx_tracer *tracer, const lx_receiver *r, lx_vec2 u, lx_ray *ray, lx_rgb *irradiance)
 {
     if (!lx_sky_has_samples(&tracer->sky)) return false;

@@ -17,6 +17,10 @@ typedef struct lx_receiver {
 bool lx_sample_source(const lx_tracer *tracer, uint32_t source, const lx_receiver *receiver, lx_vec2 u, lx_ray *out_ray,
                       lx_rgb *out_irradiance);
 
+/// A cheap upper estimate of the irradiance that a source of strength 1 can give a receiver: 0 if it certainly gives none (below the horizon, outside
+/// the cone or the range, behind a one-sided lamp), infinity if nothing is known. Within the source's own bounds it is infinity too.
+float lx_source_bound(const lx_tracer *tracer, uint32_t source, const lx_receiver *receiver);
+
 /// Weight of an emissive hit found by a cosine-weighted ray from `receiver`, against lx_sample_source. `cosine`: of the ray at the receiver.
 float lx_hit_weight(const lx_tracer *tracer, const lx_ray *ray, const lx_hit *hit, lx_vec3 hit_normal, float cosine);
 /// The same for a ray that left the scene. `direction` is unit.

@@ -85,6 +85,36 @@ static bool counts(const lx_path_settings *settings, const lx_source_use *use, u
     return vertex == 0 ? settings->direct && use->direct : settings->indirect;
 }
 
+// Roulette on light samples after the first bounce: in a room of many lamps most of them are far away from any one vertex, and what a sample
+// could bring is far below the noise of the path itself. What brings less than the source's mean irradiance in the scene is looked at with that
+// probability and weighs accordingly more, so the expectation stays. Depends on the path and its source alone, never on other sources.
+// Returns 1 / probability, 0 if the sample is skipped.
+static float roulette(const path *p, uint32_t key, float brings, float scale)
+{
+    if (!(brings < scale)) return 1;
+    const float probability = brings / scale;
+    const uint32_t bits = lx_hash_combine(lx_hash_combine(p->stream, key), p->sample);
+    return lx_unit_float(bits) < probability ? 1 / probability : 0;
+}
+
+// One light sample for one path. First by what the source could bring at most, before anything is sampled; then by what the sample does bring.
+static bool sample_light(const lx_tracer *tracer, uint32_t source, const path *p, uint32_t vertex, lx_ray *ray, lx_rgb *light)
+{
+    const uint32_t key = lx_hash_combine(tracer->source_keys[source], vertex);
+    const float bound = lx_source_bound(tracer, source, &p->receiver), scale = tracer->source_scales[source];
+    if (bound == 0) return false;
+    const float brightness = lx_rgb_max(p->throughput);
+    const float chance = vertex > 0 ? roulette(p, key ^ 0x68bc21ebu, brightness * bound, scale) : 1;
+    if (chance == 0) return false;
+    const lx_vec2 u = lx_sobol_pair(p->sample, lx_hash_combine(p->stream, key));
+    if (!lx_sample_source(tracer, source, &p->receiver, u, ray, light)) return false;
+    *light = lx_rgb_scale(*light, chance);
+    if (vertex == 0) return true;
+    const float again = roulette(p, key ^ 0x02e5be93u, brightness * lx_rgb_max(*light), scale);
+    *light = lx_rgb_scale(*light, again);
+    return again > 0;
+}
+
 static void add_light_samples(lx_path_batch *b, const lx_path_settings *settings, size_t path_count, uint32_t vertex, double *sums)
 {
     const lx_tracer *tracer = settings->tracer;
@@ -92,11 +122,8 @@ static void add_light_samples(lx_path_batch *b, const lx_path_settings *settings
         const lx_source_use *use = &settings->uses[s];
         if (!counts(settings, use, vertex)) continue;
         size_t count = 0;
-        const uint32_t key = lx_hash_combine(tracer->source_keys[s], vertex);
         for (size_t i = 0; i < path_count; ++i) {
-            const path *p = &b->paths[i];
-            const lx_vec2 u = lx_sobol_pair(p->sample, lx_hash_combine(p->stream, key));
-            if (!lx_sample_source(tracer, s, &p->receiver, u, &b->rays[count], &b->light[count])) continue;
+            if (!sample_light(tracer, s, &b->paths[i], vertex, &b->rays[count], &b->light[count])) continue;
             b->owner[count++] = (uint32_t)i;
         }
         lx_trace_transmittance(tracer, b->rays, b->transmittance, count);

@@ -180,6 +180,108 @@ static lx_result build_accel(lx_tracer *tracer, lx_error *error)
     return result;
 }
 
+// Surface area of everything traced, m².
+static double total_area(const lx_tracer *tracer)
+{
+    double sum = 0;
+    for (uint32_t s = 0; s < tracer->scene->surface_count; ++s) {
+        if (!tracer->surfaces[s].positions) continue;
+        const uint32_t count = tracer->scene->primitives[tracer->scene->surfaces[s].primitive].triangle_count;
+        for (uint32_t t = 0; t < count; ++t) {
+            lx_vec3 p[3];
+            lx_triangle_corners(tracer, s, t, p);
+            sum += 0.5 * (double)lx_length(lx_cross(lx_sub(p[1], p[0]), lx_sub(p[2], p[0])));
+        }
+    }
+    return sum;
+}
+
+// Luminous flux per unit of strength: what a source sends out altogether.
+static double unit_flux(const lx_tracer *tracer, uint32_t index)
+{
+    const double pi = 3.14159265358979323846;
+    const lx_source *source = lx_tracer_source(tracer, index);
+    if (source->kind == LX_SOURCE_EMISSIVE) return pi * (double)tracer->emitters.source_power[index];
+    if (source->light < 0) return 0;
+    const lx_light *light = &tracer->scene->lights[source->light];
+    switch (light->kind) {
+    case LX_LIGHT_POINT: return 4 * pi;
+    case LX_LIGHT_SPOT: return 2 * pi * (1 - cos((double)light->outer_angle));
+    case LX_LIGHT_RECT: return pi * 4 * (double)(lx_length(light->axis_x) * lx_length(light->axis_y));
+    case LX_LIGHT_DISK: return pi * pi * (double)(lx_length(light->axis_x) * lx_length(light->axis_y));
+    case LX_LIGHT_DIRECTIONAL: break;
+    }
+    return 0;
+}
+
+static lx_result build_scales(lx_tracer *tracer, lx_error *error)
+{
+    tracer->source_scales = lx_calloc_array(tracer->source_count, sizeof(float));
+    if (!tracer->source_scales) return lx_fail_memory(error, "sources");
+    const double area = total_area(tracer);
+    for (uint32_t i = 0; i < tracer->source_count; ++i) {
+        const lx_source_kind kind = lx_tracer_source(tracer, i)->kind;
+        // Sun and sky have no flux of their own: a tenth of what they give in the open.
+        tracer->source_scales[i] = kind == LX_SOURCE_DIRECTIONAL ? 0.1f
+                                   : kind == LX_SOURCE_SKY       ? 0.1f * LX_PI
+                                   : area > 0                    ? (float)(unit_flux(tracer, i) / area)
+                                                                 : 0;
+    }
+    return LX_OK;
+}
+
+static lx_source_sphere sphere_of_emissive(const lx_tracer *tracer, uint32_t source)
+{
+    const lx_emitters *e = &tracer->emitters;
+    lx_bounds bounds = lx_bounds_empty();
+    lx_vec3 p[3];
+    for (uint32_t i = e->first_triangle[source]; i < e->first_triangle[source + 1]; ++i) {
+        lx_triangle_corners(tracer, e->triangles[i].surface, e->triangles[i].triangle, p);
+        for (int k = 0; k < 3; ++k) lx_bounds_add(&bounds, p[k]);
+    }
+    lx_source_sphere s = {.centre = lx_scale(lx_add(bounds.low, bounds.high), 0.5f), .power = e->source_power[source]};
+    for (uint32_t i = e->first_triangle[source]; i < e->first_triangle[source + 1]; ++i) {
+        lx_triangle_corners(tracer, e->triangles[i].surface, e->triangles[i].triangle, p);
+        for (int k = 0; k < 3; ++k) s.radius = lx_max(s.radius, lx_distance(s.centre, p[k]));
+    }
+    s.radius *= 1.0001f;
+    return s;
+}
+
+static lx_source_sphere sphere_of_light(const lx_light *light)
+{
+    lx_source_sphere s = {.centre = light->position, .radius = light->radius, .power = 1, .cos_outer = -1};
+    const float width = lx_length(light->axis_x), depth = lx_length(light->axis_y);
+    switch (light->kind) {
+    case LX_LIGHT_DIRECTIONAL: s.power = INFINITY; break;
+    case LX_LIGHT_SPOT: s.cos_outer = cosf(light->outer_angle); break;
+    case LX_LIGHT_RECT:
+    case LX_LIGHT_DISK:
+        s.radius = sqrtf(width * width + depth * depth);
+        s.power = 4 * width * depth;
+        break;
+    case LX_LIGHT_POINT: break;
+    }
+    return s;
+}
+
+static lx_result build_spheres(lx_tracer *tracer, lx_error *error)
+{
+    tracer->source_spheres = lx_calloc_array(tracer->source_count, sizeof *tracer->source_spheres);
+    if (!tracer->source_spheres) return lx_fail_memory(error, "sources");
+    for (uint32_t i = 0; i < tracer->source_count; ++i) {
+        const lx_source *source = lx_tracer_source(tracer, i);
+        lx_source_sphere *s = &tracer->source_spheres[i];
+        if (source->kind == LX_SOURCE_EMISSIVE)
+            *s = sphere_of_emissive(tracer, i);
+        else if (source->light >= 0)
+            *s = sphere_of_light(&tracer->scene->lights[source->light]);
+        else
+            s->power = INFINITY;
+    }
+    return LX_OK;
+}
+
 static lx_result build_sources(lx_tracer *tracer, const lx_sky_desc *sky, lx_error *error)
 {
     const lx_scene *scene = tracer->scene;
@@ -214,6 +316,8 @@ lx_result lx_tracer_create(const lx_scene *scene, const lx_transport_desc *trans
     LX_TRY(build_accel(tracer, error));
     LX_TRY(build_sources(tracer, &transport->sky, error));
     LX_TRY(lx_emitters_build(tracer, error));
+    LX_TRY(build_scales(tracer, error));
+    LX_TRY(build_spheres(tracer, error));
     *out_tracer = tracer;
     tracer = NULL;
 cleanup:
@@ -228,6 +332,8 @@ void lx_tracer_destroy(lx_tracer *tracer)
     lx_emitters_release(&tracer->emitters);
     lx_sky_release(&tracer->sky);
     lx_free(tracer->source_keys);
+    lx_free(tracer->source_scales);
+    lx_free(tracer->source_spheres);
     lx_free(tracer->surfaces);
     lx_free(tracer->positions);
     lx_free(tracer);

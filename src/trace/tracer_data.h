@@ -20,6 +20,14 @@ typedef struct lx_traced_surface {
     uint32_t first_emitter_triangle; ///< Into emitters.triangles if the surface emits.
 } lx_traced_surface;
 
+/// Where a source is and how much it can give, for leaving it out cheaply.
+typedef struct lx_source_sphere {
+    lx_vec3 centre;
+    float radius;
+    float power;     ///< Largest E · d² at unit strength: candela, or nit × m². Infinity: the source is everywhere (sun, sky).
+    float cos_outer; ///< Spots.
+} lx_source_sphere;
+
 struct lx_tracer {
     const lx_scene *scene;
     bool coloured_shadows;
@@ -30,6 +38,8 @@ struct lx_tracer {
     lx_sky sky;
     lx_source sky_source;
     uint32_t *source_keys;       ///< [source count] random stream of each source, from its name: see lx_tracer_source_key.
+    float *source_scales;        ///< [source count] irradiance that a source of strength 1 would give if its flux were spread evenly over all surfaces.
+    lx_source_sphere *source_spheres; ///< [source count]
     uint32_t source_count;
 };
 
