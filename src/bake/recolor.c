@@ -146,7 +146,7 @@ lx_result lx_baked_set(lx_baked *baked, const char *assignment, lx_error *error)
     const char *equals = strrchr(assignment, '=');
     char *name = equals ? lx_strndup(assignment, (size_t)(equals - assignment)) : NULL;
     float color[3], given = 0;
-    bool has_intensity, found = false, exact = false;
+    bool has_intensity = false, found = false, exact = false;
     if (!equals || !*assignment || equals == assignment)
         result = lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "'%s': must be LAYER=COLOUR or LAYER=COLOUR*INTENSITY", assignment);
     else if (!name)
