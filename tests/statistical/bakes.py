@@ -6,7 +6,7 @@ import os
 
 import exr
 import oracle
-from gltf import Gltf, box, look, quad, quat, quat_rotate, v_add, v_dot, v_len, v_mul, v_norm, v_sub
+from gltf import Gltf, box, box_between, look, quad, quat, quat_rotate, v_add, v_dot, v_len, v_mul, v_norm, v_sub
 from harness import expect, luxel, read
 from lamps import COLOR, DOWN, lamp, node
 from measure import below, case, compare, compare_mean, grey
@@ -180,6 +180,52 @@ def texels_of_a_closed_dark_box_stay_dark():
     values = [max(total[c][t] for c in range(3)) for t in baked.texels()]
     below("each texel, of 100 lux", 1e-3, [v / 100 for v in values], 256)
     below("mean, of 100 lux", 1e-5, [math.fsum(values) / len(values) / 100], 256)
+
+
+@case
+def texels_take_the_interpolated_vertex_normal_and_nothing_from_below_the_surface():
+    slant = v_norm((0.5, 0, 0.8660254))  # of the quad, which faces +z before it is turned up
+    for towards, name in (((0, 1, 0), "from above"), (v_norm((0.6, 0.8, 0)), "along the vertex normal"), (v_norm((1, -0.1, 0)), "from below")):
+        scene = lamp("directional", 10, rotation=look((0, 0, 0), v_mul(towards, -1)), color=(1, 1, 1))
+        mesh = mapped_quad(3, 2)
+        mesh.normals = [slant] * 4
+        node(scene, "floor", mesh=scene.add_mesh("floor", (mesh, scene.add_material("floor", base_color=(0.5, 0.5, 0.5)))), rotation=UP)
+        normal = quat_rotate(UP, slant)
+        baked = bake(scene, "out " + name, 32, 16, 0)
+        expected, got = floor_texels(baked, "lamp", (3, 2), (0, 0, 0), lambda p, n: max(0, v_dot(normal, towards)) * (towards[1] > 0), UP)
+        got = [tuple(10 * c for c in g) for g in got]
+        compare_mean(name, 1 + 10 * expected[0], [1 + g[0] for g in got], 1e-5, 16)
+
+
+@case
+def texels_under_a_wall_belong_to_the_side_they_come_out_at():
+    # A house of solid walls, 0.5 m thick, stands on a floor of texels of 0.25 m that do not line up with it; the sun is overhead.
+    # Texels that reach indoors are dark, those that reach out of doors are lit; there are none that do both.
+    size, scene = (8.0, 8.0), lamp("directional", 10, rotation=look((0, 0, 0), (0, -1, 0)), color=(1, 1, 1))
+    floor_scene(scene, size)
+    dark = scene.add_material("dark", base_color=(0, 0, 0), unlit=True)
+    x0, x1, z0, z1, wall, high = -2.13, 1.77, -1.58, 2.21, 0.5, 2.0
+    # One solid with a hollow; its walls go 0.2 m into the ground, as walls do. (Where two solids touch, as walls of four boxes would,
+    # a texel can be pushed from one into the other and stays dark; that is not handled yet.)
+    house = box_between((x0 - wall, -0.2, z0 - wall), (x1 + wall, high + wall, z1 + wall))
+    house.append(box_between((x0, -0.2, z0), (x1, high, z1)).flip())
+    scene.add_node("house", mesh=scene.add_mesh("house", (house, dark)))
+    baked = bake(scene, "out", 40, 64, 0)
+    expected, got, names = [], [], []
+    for j in range(40):
+        for i in range(40):
+            spots = texel_points(40, i, j, *size, 2)
+            if spots is None:
+                continue
+            middle = quat_rotate(UP, v_mul(v_add(spots[0], spots[3]), 0.5))
+            edge = 0.5 * size[0] / (HIGH - LOW) / 40
+            inside = (x0 - edge < middle[0] < x1 + edge) and (z0 - edge < middle[2] < z1 + edge)
+            under = (x0 - wall + edge < middle[0] < x1 + wall - edge) and (z0 - wall + edge < middle[2] < z1 + wall - edge)
+            if under and not inside:
+                continue  # all of it inside the wall
+            expected.append(0.0 if inside else 10.0)
+            got.append(tuple(10 * c[j * 40 + i] for c in baked.layers["lamp"]))
+    compare("each texel", grey(expected), got, 1e-4, 64)
 
 
 # --- Layers -----------------------------------------------------------------------------------------------------------

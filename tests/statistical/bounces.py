@@ -198,6 +198,28 @@ def two_plates_exchange_light_by_their_form_factor():
     compare("albedo ∫ E dF", grey([expected]), got, 0.01, 65536)
 
 
+@case
+def floor_with_a_picture_reflects_by_its_srgb_values_and_vertex_colours():
+    # The floor of two_plates, in stripes of unequal grey along x and with a vertex colour.
+    columns, tint = [255, 128, 0, 60, 200], (0.5, 0.8, 1.0)
+    scene = Gltf()
+    pixels = bytes(b for c in columns for b in (c, c, c))
+    picture = scene.add_image("stripes", len(columns), 1, pixels, wrap=False, nearest=True)
+    floor = scene.add_material("floor", base_color=(0.9, 0.9, 0.9), texture=picture)
+    mesh = quad(2, 2, fit=True).paint(tint)
+    scene.add_node("floor", mesh=scene.add_mesh("floor", (mesh, floor)), rotation=DOWN)
+    place, point, normal, steps, expected = (0.3, 1.0, 0.2), (-0.4, 0.8, 0.1), (0, -1, 0), 200, 0.0
+    node(scene, "lamp", light=scene.add_light("point", 30, color=(1, 1, 1)), translation=place)
+    for i in range(steps):
+        albedo = 0.9 * oracle.srgb(columns[i * len(columns) // steps])
+        for j in range(steps):
+            q = ((i + 0.5) / steps * 2 - 1, 0.0, (j + 0.5) / steps * 2 - 1)
+            a, b = v_sub(place, q), v_sub(point, q)
+            expected += albedo * 30 * a[1] / v_len(a) ** 3 * b[1] * b[1] / v_len(b) ** 4 / math.pi * (2 / steps) ** 2
+    got = irradiance(scene, [(point, normal)], 65536, 1)
+    compare("∫ albedo E dF", [tuple(expected * c for c in tint)], got, 0.01, 65536)
+
+
 # --- Robustness -------------------------------------------------------------------------------------------------------
 
 
