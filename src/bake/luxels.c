@@ -275,21 +275,24 @@ static lx_vec3 lift(const lx_tracer *tracer, const lx_fragment *f, const lx_vec3
 // something; the site moves to that face's front.
 static void push_off(const lx_tracer *tracer, float texel_m, lx_receiver *r)
 {
+    enum { direction_count = 8 }; // diagonals reach the inner corner of a room from under it
     lx_vec3 t, b;
     lx_tangent_frame(r->geometric_normal, &t, &b);
-    const lx_vec3 direction[4] = {t, lx_neg(t), b, lx_neg(b)};
+    const lx_vec3 direction[direction_count] = {
+        t, lx_neg(t), b, lx_neg(b), lx_add(t, b), lx_sub(t, b), lx_sub(b, t), lx_neg(lx_add(t, b))};
     const lx_vec3 origin = lx_offset_origin(r->position, r->geometric_normal);
-    lx_ray rays[4];
-    lx_hit hits[4];
-    for (int i = 0; i < 4; ++i) rays[i] = (lx_ray){.origin = origin, .direction = direction[i], .t_max = texel_m};
-    lx_trace_closest(tracer, rays, hits, 4);
+    lx_ray rays[direction_count];
+    lx_hit hits[direction_count];
+    for (int i = 0; i < direction_count; ++i) rays[i] = (lx_ray){.origin = origin, .direction = direction[i], .t_max = texel_m};
+    lx_trace_closest(tracer, rays, hits, direction_count);
     float nearest = INFINITY;
-    for (int i = 0; i < 4; ++i) {
-        if (hits[i].surface == LX_MISS || hits[i].t >= nearest || lx_surface_is_double_sided(tracer, hits[i].surface)) continue;
+    for (int i = 0; i < direction_count; ++i) {
+        if (hits[i].surface == LX_MISS || lx_surface_is_double_sided(tracer, hits[i].surface)) continue;
+        const float distance = hits[i].t * lx_length(direction[i]);
         lx_vec3 position, normal;
         lx_hit_geometry(tracer, &hits[i], &position, &normal);
-        if (lx_dot(normal, direction[i]) <= 0) continue; // a front face: just a neighbour
-        nearest = hits[i].t;
+        if (distance >= nearest || lx_dot(normal, direction[i]) <= 0) continue; // a front face: just a neighbour
+        nearest = distance;
         r->position = lx_offset_origin(position, normal);
     }
 }
