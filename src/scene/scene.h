@@ -78,7 +78,7 @@ typedef struct lx_primitive {
 typedef struct lx_mesh {
     const char *name;
     uint32_t first_primitive, primitive_count; ///< Primitives that have triangles, in file order.
-    uint32_t file_index;
+    uint32_t file_index;       ///< Repeats where nodes give one file mesh different morph weights.
 } lx_mesh;
 
 /// A mesh at a place in the world. An EXT_mesh_gpu_instancing node yields one per instance.
