@@ -6,7 +6,8 @@
 
 #include <string.h>
 
-static const double density_step = 1.004; // relative accuracy of the search: 0.8 % of the texels
+static const double density_step = 1.005; // relative accuracy of the search: 1 % of the texels
+static const double usual_share = 0.8;    // of the pages' texels that lx_estimate_texels() comes to when they are full
 
 // Packing one mesh at job->texels_per_m.
 static lx_result pack_mesh(void *user, size_t index, uint32_t worker, lx_error *error)
@@ -135,44 +136,68 @@ cleanup:
     return result;
 }
 
-// The largest density that fits, at most `high` (0: no bound), within density_step. On return that density is evaluated.
-static lx_result search(lx_unwrap_job *job, double high, lx_box *boxes, double *out, uint32_t *out_pages, lx_error *error)
+static double estimate_texels(const lx_unwrap_job *job, double texels_per_m)
 {
-    lx_result result = LX_OK;
-    double longest = 0;
-    const uint32_t max_pages = job->desc.max_pages;
-    const double texels = (double)job->desc.page_size * job->desc.page_size * max_pages;
-    const double full = sqrt(texels / total_area(job, &longest)); // every texel used
-    const double floor_density = 0.5 / longest;                   // every chart within a texel
-    double low = 0, tried = 0;
-    uint32_t pages = 0;
-    if (!(high > 0)) high = full * 1.001;
-    double density = fmin(full * 0.82, high / density_step), shrink = 0.8;
-    for (;;) { // bracket
-        LX_TRY(evaluate(job, density, max_pages, boxes, &pages, error));
-        tried = density;
-        if (pages <= max_pages) {
-            low = density;
-            if (high / low <= 1.25) break;
-            density = fmin(density * 1.12, high / density_step);
-        } else {
-            if (density <= floor_density) return fail_hopeless(job, floor_density, boxes, error);
-            high = density;
-            if (low > 0) break;
-            density = fmax(density * shrink, floor_density);
-            shrink *= shrink > 0.1 ? 0.8 : 1;
+    double texels = 0;
+    for (uint32_t m = 0; m < job->mesh_count; ++m) {
+        const lx_mesh_job *mesh = &job->meshes[m];
+        const double own = texels_per_m * mesh->density, edge = own * sqrt(mesh->set.area / fmax(mesh->set.uv_area, 1e-30));
+        const double whole = mesh->existing ? edge * edge * (double)(mesh->set.high.x - mesh->set.low.x) *
+                                                  (double)(mesh->set.high.y - mesh->set.low.y)
+                                            : lx_estimate_texels(&mesh->charts, own, job->desc.padding);
+        for (uint32_t i = 0; i < mesh->instance_count; ++i) {
+            const double ratio = fmax((double)job->ratios[job->instances[mesh->first_instance + i]], 2.0 / job->desc.padding);
+            texels += whole * ratio * ratio;
         }
     }
-    while (high / low > density_step) {
-        const double middle = sqrt(high * low);
-        LX_TRY(evaluate(job, middle, max_pages, boxes, &pages, error));
-        tried = middle;
-        if (pages <= max_pages)
+    return texels;
+}
+
+// Where the search begins: the density at which the estimate fills a usual share of the pages.
+static double guess_density(const lx_unwrap_job *job, double low, double high, double texels)
+{
+    for (int i = 0; i < 24 && high > low * 1.01; ++i) {
+        const double middle = sqrt(low * high);
+        if (estimate_texels(job, middle) < usual_share * texels)
             low = middle;
         else
             high = middle;
     }
-    if (tried != low || pages > max_pages) LX_TRY(evaluate(job, low, max_pages, boxes, &pages, error));
+    return low;
+}
+
+// The largest density that fits, at most `high` (0: no bound), within density_step. On return that density is evaluated.
+static lx_result search(lx_unwrap_job *job, double high, lx_box *boxes, double *out, uint32_t *out_pages, lx_error *error)
+{
+    lx_result result = LX_OK;
+    double longest = 0, low = 0, tried = 0, step = 1.06;
+    uint32_t pages = 0;
+    const uint32_t max_pages = job->desc.max_pages;
+    const double texels = (double)job->desc.page_size * job->desc.page_size * max_pages;
+    const double full = sqrt(texels / total_area(job, &longest)); // every texel used
+    const double lowest = 0.5 / longest;                          // every chart within a texel
+    if (!(high > 0)) high = fmax(full, lowest) * 1.001;
+    double density = fmin(guess_density(job, lowest, high, texels), high / density_step);
+    while (!(low > 0) || high / low > density_step) {
+        LX_TRY(evaluate(job, density, max_pages, boxes, &pages, error));
+        tried = density;
+        if (pages <= max_pages)
+            low = density;
+        else
+            high = density;
+        if (low > 0 && high / low <= step) { // bracketed
+            density = sqrt(high * low);
+        } else if (low > 0) { // upwards, in growing steps
+            density = fmin(low * step, sqrt(high * low));
+            step *= step;
+        } else if (high > lowest) { // downwards
+            density = fmax(high / step, lowest);
+            step *= step;
+        } else {
+            return fail_hopeless(job, lowest, boxes, error);
+        }
+    }
+    if (tried != low) LX_TRY(evaluate(job, low, max_pages, boxes, &pages, error));
     *out = low;
     *out_pages = pages;
 cleanup:
@@ -223,6 +248,13 @@ static void fill_rects(lx_unwrap_job *job, const lx_box *boxes)
     }
 }
 
+// To three digits, so that what a message promises still fits.
+static double round_down(double v)
+{
+    const double unit = pow(10, floor(log10(v)) - 2);
+    return floor(v / unit) * unit;
+}
+
 lx_result lx_choose_density(lx_unwrap_job *job, lx_error *error)
 {
     lx_result result = LX_OK;
@@ -242,7 +274,7 @@ lx_result lx_choose_density(lx_unwrap_job *job, lx_error *error)
             if (pages > max_pages) {
                 LX_TRY(search(job, asked, boxes, &density, &pages, error));
                 LX_TRY(lx_fail(error, LX_ERROR_LIMIT, "%g texels per metre do not fit %u page%s of %u texels; %.3g texels per metre would fit",
-                               asked, max_pages, max_pages == 1 ? "" : "s", page_size, floor(density * 100) / 100));
+                               asked, max_pages, max_pages == 1 ? "" : "s", page_size, round_down(density)));
             }
         } else {
             LX_TRY(search(job, 0, boxes, &density, &pages, error));

@@ -14,10 +14,14 @@ enum { pairs_per_triangle = 400, pairs_free = 100000, fallback_raster = 2048, ma
 
 typedef struct box2 { double x0, y0, x1, y1; } box2;
 
-static box2 triangle_box(const lx_dvec2 *p)
+// Comparisons instead of fmin and fmax: these are calls, and this is the innermost loop.
+static inline double least(double a, double b) { return a < b ? a : b; }
+static inline double most(double a, double b) { return a > b ? a : b; }
+
+static inline box2 triangle_box(const lx_dvec2 *p)
 {
-    return (box2){fmin(p[0].x, fmin(p[1].x, p[2].x)), fmin(p[0].y, fmin(p[1].y, p[2].y)),
-                  fmax(p[0].x, fmax(p[1].x, p[2].x)), fmax(p[0].y, fmax(p[1].y, p[2].y))};
+    return (box2){least(p[0].x, least(p[1].x, p[2].x)), least(p[0].y, least(p[1].y, p[2].y)),
+                  most(p[0].x, most(p[1].x, p[2].x)), most(p[0].y, most(p[1].y, p[2].y))};
 }
 
 // True if a line through an edge of `a` has all of `b` outside, up to `slack`.
@@ -25,7 +29,7 @@ static bool edge_separates(const lx_dvec2 *a, const lx_dvec2 *b, double slack)
 {
     for (int i = 0; i < 3; ++i) {
         const lx_dvec2 p = a[i], q = a[i == 2 ? 0 : i + 1];
-        const double dx = q.x - p.x, dy = q.y - p.y, limit = slack * sqrt(dx * dx + dy * dy);
+        const double dx = q.x - p.x, dy = q.y - p.y, limit = slack * (fabs(dx) + fabs(dy));
         bool outside = true;
         for (int k = 0; k < 3 && outside; ++k) outside = dx * (b[k].y - p.y) - dy * (b[k].x - p.x) <= limit;
         if (outside) return true;
@@ -54,7 +58,7 @@ typedef struct grid {
 
 static uint32_t grid_index(double value, double low, double cell, uint32_t count)
 {
-    const double i = floor((value - low) / cell);
+    const double i = (value - low) / cell;
     return !(i > 0) ? 0 : i >= (double)count ? count - 1 : (uint32_t)i;
 }
 
@@ -121,8 +125,8 @@ static bool compare_cells(const grid *g, const lx_dvec2 *points, const uint32_t 
                 for (size_t j = i + 1; j < g->starts[c + 1]; ++j) {
                     const lx_dvec2 *b = &points[3 * (size_t)g->entries[j]];
                     const box2 bb = triangle_box(b);
-                    const double left = fmax(ba.x0, bb.x0), bottom = fmax(ba.y0, bb.y0);
-                    if (left > fmin(ba.x1, bb.x1) || bottom > fmin(ba.y1, bb.y1)) continue;
+                    const double left = most(ba.x0, bb.x0), bottom = most(ba.y0, bb.y0);
+                    if (left > least(ba.x1, bb.x1) || bottom > least(ba.y1, bb.y1)) continue;
                     // A pair meets in many cells; the one with the corner of the common box decides.
                     if (grid_index(left, g->x0, g->cell, g->columns) != x || grid_index(bottom, g->y0, g->cell, g->rows) != y)
                         continue;
@@ -191,7 +195,7 @@ bool lx_find_overlap(const lx_dvec2 *points, uint32_t count, const uint32_t *nei
     box2 all = {INFINITY, INFINITY, -INFINITY, -INFINITY};
     for (uint32_t t = 0; t < count; ++t) {
         const box2 b = triangle_box(&points[3 * (size_t)t]);
-        all = (box2){fmin(all.x0, b.x0), fmin(all.y0, b.y0), fmax(all.x1, b.x1), fmax(all.y1, b.y1)};
+        all = (box2){least(all.x0, b.x0), least(all.y0, b.y0), most(all.x1, b.x1), most(all.y1, b.y1)};
     }
     const double slack = depth_tolerance * fmax(all.x1 - all.x0, all.y1 - all.y0);
     grid g = {0};

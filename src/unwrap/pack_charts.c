@@ -168,16 +168,29 @@ typedef struct run { uint32_t y, x, length; } run;
 
 typedef struct shape {
     bitmap bits;
-    run *runs;          // the longest of every row first, rows by falling length: what fits least is asked first
-    size_t run_count, run_capacity;
+    run *runs;          // the longest first, then spread over the rows: neighbouring rows would be turned away alike
+    run *sorted;
+    size_t run_count, run_capacity, sorted_capacity;
 } shape;
 
-static int compare_runs(const void *pa, const void *pb)
+static size_t greatest_divisor(size_t a, size_t b)
 {
-    const run *a = pa, *b = pb;
-    if (a->length != b->length) return a->length > b->length ? -1 : 1;
-    if (a->y != b->y) return a->y < b->y ? -1 : 1;
-    return a->x < b->x ? -1 : a->x > b->x;
+    while (b) {
+        const size_t rest = a % b;
+        a = b;
+        b = rest;
+    }
+    return a;
+}
+
+// Steps through the runs by about the golden section of their number, starting at the longest.
+static void spread_runs(shape *s)
+{
+    size_t longest = 0, step = (size_t)((double)s->run_count * 0.618) | 1;
+    for (size_t i = 0; i < s->run_count; ++i)
+        if (s->sorted[i].length > s->sorted[longest].length) longest = i;
+    while (greatest_divisor(s->run_count, step) != 1) ++step;
+    for (size_t i = 0, at = longest; i < s->run_count; ++i, at = (at + step) % s->run_count) s->runs[i] = s->sorted[at];
 }
 
 static bool find_runs(shape *s)
@@ -202,17 +215,18 @@ static bool find_runs(shape *s)
                 end = (end / 64 + 1) * 64;
             }
             if (end > s->bits.width) end = s->bits.width;
-            if (!lx_array_reserve(&s->runs, &s->run_capacity, s->run_count + 1, sizeof *s->runs)) return false;
-            s->runs[s->run_count++] = (run){y, x, end - x};
+            if (!lx_array_reserve(&s->sorted, &s->sorted_capacity, s->run_count + 1, sizeof *s->sorted)) return false;
+            s->sorted[s->run_count++] = (run){y, x, end - x};
             x = end;
         }
     }
     if (s->run_count == 0) { // nothing drawn: a chart still owns a texel
-        if (!lx_array_reserve(&s->runs, &s->run_capacity, 1, sizeof *s->runs)) return false;
+        if (!lx_array_reserve(&s->sorted, &s->sorted_capacity, 1, sizeof *s->sorted)) return false;
         set_run(bitmap_row(&s->bits, 0), 0, 1);
-        s->runs[s->run_count++] = (run){0, 0, 1};
+        s->sorted[s->run_count++] = (run){0, 0, 1};
     }
-    qsort(s->runs, s->run_count, sizeof *s->runs, compare_runs);
+    if (!lx_array_reserve(&s->runs, &s->run_capacity, s->run_count, sizeof *s->runs)) return false;
+    spread_runs(s);
     return true;
 }
 
@@ -427,6 +441,31 @@ cleanup:
     return result;
 }
 
+// Texels that a chart takes with its padding, as far as outlines can nest into each other.
+static double chart_texels(const lx_chart *chart, double scale, uint32_t padding)
+{
+    const double fill = chart->width > 0 && chart->height > 0
+                            ? fmin(1, (double)chart->area / ((double)chart->width * (double)chart->height))
+                            : 1;
+    const uint32_t w = texel_count((double)chart->width * scale), h = texel_count((double)chart->height * scale);
+    return (double)(w + padding) * (double)(h + padding) * (0.35 + 0.65 * fill);
+}
+
+// A chart smaller than a texel has the texel to itself: it may as well fill it.
+static double chart_scale(const lx_chart *chart, double texels_per_m)
+{
+    const double extent = fmax((double)chart->width, (double)chart->height);
+    return extent > 0 && extent * texels_per_m < 0.75 ? 0.75 / extent : texels_per_m;
+}
+
+double lx_estimate_texels(const lx_chart_set *set, double texels_per_m, uint32_t padding)
+{
+    double texels = 0;
+    for (uint32_t c = 0; c < set->chart_count; ++c)
+        texels += chart_texels(&set->charts[c], chart_scale(&set->charts[c], texels_per_m), padding);
+    return texels;
+}
+
 lx_result lx_pack_charts(const lx_chart_set *set, double texels_per_m, uint32_t padding, uint32_t limit, bool alone,
                          const atomic_bool *stop, lx_placement *placements, uint32_t *out_width, uint32_t *out_height,
                          bool *out_fits, lx_error *error)
@@ -445,18 +484,14 @@ lx_result lx_pack_charts(const lx_chart_set *set, double texels_per_m, uint32_t 
     uint32_t longest = 1, narrowest = 1;
     for (uint32_t c = 0; c < count; ++c) {
         const lx_chart *chart = &set->charts[c];
-        // A chart smaller than a texel has the texel to itself: it may as well fill it.
-        const double extent = fmax((double)chart->width, (double)chart->height);
-        scales[c] = extent > 0 && extent * texels_per_m < 0.75 ? 0.75 / extent : texels_per_m;
+        scales[c] = chart_scale(chart, texels_per_m);
         const uint32_t w = texel_count((double)chart->width * scales[c]), h = texel_count((double)chart->height * scales[c]);
         const uint32_t large = w > h ? w : h, small = w > h ? h : w;
         if (large + 2 * border > limit) goto cleanup;
         if (large > longest) longest = large;
         if (small > narrowest) narrowest = small;
-        const double fill = chart->width > 0 && chart->height > 0
-                                ? fmin(1, (double)chart->area / ((double)chart->width * (double)chart->height))
-                                : 1;
-        cells += (double)(w + padding) * (double)(h + padding) * (0.35 + 0.65 * fill);
+        cells += chart_texels(chart, scales[c], padding);
+        const double extent = fmax((double)chart->width, (double)chart->height);
         keys[c] = (sort_key){(float)(extent * scales[c]), chart->area, c};
     }
     if (cells * 0.6 > (double)limit * limit) goto cleanup; // hopeless; the search does not need to know how hopeless
@@ -500,6 +535,7 @@ cleanup:
     for (int i = 0; i < 2; ++i) {
         lx_free(p.shapes[i].bits.bits);
         lx_free(p.shapes[i].runs);
+        lx_free(p.shapes[i].sorted);
     }
     lx_free(p.wide.bits);
     lx_free(p.dilated.bits);

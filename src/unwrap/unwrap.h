@@ -123,6 +123,9 @@ lx_result lx_pack_charts(const lx_chart_set *set, double texels_per_m, uint32_t 
                          const atomic_bool *stop, lx_placement *placements, uint32_t *out_width, uint32_t *out_height,
                          bool *out_fits, lx_error *error);
 
+/// About how many texels that takes, without packing.
+double lx_estimate_texels(const lx_chart_set *set, double texels_per_m, uint32_t padding);
+
 /// Texel position of a chart point.
 lx_dvec2 lx_placement_apply(const lx_placement *placement, const lx_chart *chart, lx_vec2 xy);
 
