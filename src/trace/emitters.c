@@ -85,6 +85,17 @@ static uint32_t choose_lookups(float texels, uint32_t grid, uint32_t triangle_co
     return (uint32_t)lx_clamp(lx_min(ceilf(texels / (float)grid), affordable), least_lookups, most_lookups);
 }
 
+// Where the search for u in [k / count, (k + 1) / count) begins: almost always at the right step or the one before it, so that a choice costs
+// two look-ups instead of a binary search's dozen.
+static void build_guide(const float *cdf, uint32_t count, uint32_t *guide)
+{
+    for (uint32_t k = 0, step = 0; k < count; ++k) {
+        const float u = (float)k / (float)count;
+        while (step + 1 < count && cdf[step + 1] <= u) ++step;
+        guide[k] = step;
+    }
+}
+
 // Fills the piece table of one triangle; returns its mean brightness.
 static lx_result build_pieces(const lx_tracer *tracer, lx_emitters *emitters, size_t *capacity, lx_emitter_triangle *t,
                               uint32_t lookups, float *out_mean, lx_error *error)
@@ -96,7 +107,8 @@ static lx_result build_pieces(const lx_tracer *tracer, lx_emitters *emitters, si
     }
     const size_t entries = 2 * (size_t)n * n;
     if (emitters->piece_count + entries + 1 > UINT32_MAX ||
-        !lx_array_reserve(&emitters->piece_cdf, capacity, emitters->piece_count + entries + 1, sizeof(float)))
+        !lx_array_reserve(&emitters->piece_cdf, &capacity[0], emitters->piece_count + entries + 1, sizeof(float)) ||
+        !lx_array_reserve(&emitters->piece_guide, &capacity[1], emitters->piece_count + entries + 1, sizeof(uint32_t)))
         return lx_fail_memory(error, "emitters");
     t->first_cdf = (uint32_t)emitters->piece_count;
     float *cdf = emitters->piece_cdf + t->first_cdf;
@@ -122,14 +134,17 @@ static lx_result build_pieces(const lx_tracer *tracer, lx_emitters *emitters, si
             }
     if (running > 0)
         for (size_t e = 1; e <= entries; ++e) cdf[e] = (float)((double)cdf[e] / running);
+    build_guide(cdf, (uint32_t)entries, emitters->piece_guide + t->first_cdf);
     *out_mean = (float)mean;
     return LX_OK;
 }
 
-static lx_result add_surface(lx_tracer *tracer, lx_emitters *emitters, size_t *triangle_capacity, size_t *piece_capacity,
+static lx_result add_surface(lx_tracer *tracer, lx_emitters *emitters, size_t *triangle_capacity, size_t piece_capacity[2],
                              uint32_t surface, lx_error *error)
 {
     const lx_primitive *primitive = &tracer->scene->primitives[tracer->scene->surfaces[surface].primitive];
+    const lx_material *material = &tracer->scene->materials[tracer->scene->surfaces[surface].material];
+    const bool plain = material->emissive_texture.texture < 0 && tracer->surfaces[surface].kind == LX_SURFACE_OPAQUE;
     const size_t first = emitters->triangle_count;
     if (first + primitive->triangle_count > UINT32_MAX ||
         !lx_array_reserve(&emitters->triangles, triangle_capacity, first + primitive->triangle_count,
@@ -141,8 +156,11 @@ static lx_result add_surface(lx_tracer *tracer, lx_emitters *emitters, size_t *t
         lx_emitter_triangle *t = &emitters->triangles[first + i];
         lx_vec3 p[3];
         lx_triangle_corners(tracer, surface, i, p);
-        *t = (lx_emitter_triangle){.surface = surface, .triangle = i};
-        t->area = 0.5f * lx_length(lx_cross(lx_sub(p[1], p[0]), lx_sub(p[2], p[0])));
+        *t = (lx_emitter_triangle){.origin = p[0], .edge1 = lx_sub(p[1], p[0]), .edge2 = lx_sub(p[2], p[0]), .plain = plain,
+                                   .double_sided = lx_surface_is_double_sided(tracer, surface), .surface = surface, .triangle = i};
+        const lx_vec3 cross = lx_scale(lx_cross(t->edge1, t->edge2), tracer->surfaces[surface].orientation);
+        t->normal = lx_normalize_or(cross, (lx_vec3){0, 0, 0});
+        t->area = 0.5f * lx_length(cross);
         const float texels = t->area > 0 ? texels_across(tracer, surface, i) : 0;
         t->grid = choose_grid(texels);
         const uint32_t lookups = choose_lookups(texels, t->grid, primitive->triangle_count);
@@ -158,7 +176,7 @@ lx_result lx_emitters_build(lx_tracer *tracer, lx_error *error)
 {
     const lx_scene *scene = tracer->scene;
     lx_emitters *emitters = &tracer->emitters;
-    size_t triangle_capacity = 0, piece_capacity = 0;
+    size_t triangle_capacity = 0, piece_capacity[2] = {0, 0};
     emitters->first_triangle = lx_calloc_array((size_t)scene->source_count + 1, sizeof(uint32_t));
     emitters->source_power = lx_calloc_array(scene->source_count, sizeof(float));
     if (!emitters->first_triangle || !emitters->source_power) return lx_fail_memory(error, "emitters");
@@ -167,13 +185,14 @@ lx_result lx_emitters_build(lx_tracer *tracer, lx_error *error)
         if (scene->sources[source].kind != LX_SOURCE_EMISSIVE) continue;
         for (uint32_t s = 0; s < scene->surface_count; ++s) {
             if (scene->surfaces[s].source != (int32_t)source || !tracer->surfaces[s].positions) continue;
-            const lx_result result = add_surface(tracer, emitters, &triangle_capacity, &piece_capacity, s, error);
+            const lx_result result = add_surface(tracer, emitters, &triangle_capacity, piece_capacity, s, error);
             if (result != LX_OK) return result;
         }
     }
     emitters->first_triangle[scene->source_count] = (uint32_t)emitters->triangle_count;
     emitters->triangle_cdf = lx_calloc_array(emitters->triangle_count + scene->source_count, sizeof(float));
-    if (!emitters->triangle_cdf) return lx_fail_memory(error, "emitters");
+    emitters->triangle_guide = lx_calloc_array(emitters->triangle_count + scene->source_count, sizeof(uint32_t));
+    if (!emitters->triangle_cdf || !emitters->triangle_guide) return lx_fail_memory(error, "emitters");
     for (uint32_t source = 0; source < scene->source_count; ++source) {
         const uint32_t first = emitters->first_triangle[source], end = emitters->first_triangle[source + 1];
         double total = 0;
@@ -187,6 +206,7 @@ lx_result lx_emitters_build(lx_tracer *tracer, lx_error *error)
             t->probability = total > 0 ? (float)((double)t->probability / total) : 0;
             cdf[i - first + 1] = total > 0 ? (float)(running / total) : 0;
         }
+        build_guide(cdf, end - first, emitters->triangle_guide + first + source);
     }
     return LX_OK;
 }
@@ -196,22 +216,18 @@ void lx_emitters_release(lx_emitters *emitters)
     lx_free(emitters->triangles);
     lx_free(emitters->triangle_cdf);
     lx_free(emitters->piece_cdf);
+    lx_free(emitters->triangle_guide);
+    lx_free(emitters->piece_guide);
     lx_free(emitters->first_triangle);
     lx_free(emitters->source_power);
     *emitters = (lx_emitters){0};
 }
 
 // Step of a running sum that u falls into; u becomes its place within the step.
-static uint32_t choose(const float *cdf, uint32_t count, float *u)
+static uint32_t choose(const float *cdf, const uint32_t *guide, uint32_t count, float *u)
 {
-    uint32_t low = 0, high = count;
-    while (high - low > 1) {
-        const uint32_t middle = low + (high - low) / 2;
-        if (cdf[middle] <= *u)
-            low = middle;
-        else
-            high = middle;
-    }
+    uint32_t low = guide[(uint32_t)(*u * (float)count)];
+    while (low + 1 < count && cdf[low + 1] <= *u) ++low;
     const float width = cdf[low + 1] - cdf[low];
     *u = width > 0 ? lx_clamp((*u - cdf[low]) / width, 0, 0x1.fffffep-1f) : 0.5f;
     return low;
@@ -222,9 +238,9 @@ bool lx_emitters_sample(const lx_emitters *emitters, uint32_t source, lx_vec2 u,
     const uint32_t first = emitters->first_triangle[source], count = emitters->first_triangle[source + 1] - first;
     const float *cdf = emitters->triangle_cdf + first + source;
     if (count == 0 || !(cdf[count] > 0)) return false;
-    const lx_emitter_triangle *t = &emitters->triangles[first + choose(cdf, count, &u.x)];
+    const lx_emitter_triangle *t = &emitters->triangles[first + choose(cdf, emitters->triangle_guide + first + source, count, &u.x)];
     if (!(t->probability > 0)) return false;
-    *out = (lx_emitter_sample){.surface = t->surface, .triangle = t->triangle, .pdf_area = t->probability / t->area};
+    *out = (lx_emitter_sample){.triangle = t, .pdf_area = t->probability / t->area};
     if (t->grid == 1) {
         const lx_vec2 b = lx_sample_triangle(u);
         out->u = b.x;
@@ -233,7 +249,7 @@ bool lx_emitters_sample(const lx_emitters *emitters, uint32_t source, lx_vec2 u,
     }
     const uint32_t n = t->grid, entries = 2 * n * n;
     const float *pieces = emitters->piece_cdf + t->first_cdf;
-    const uint32_t e = choose(pieces, entries, &u.x);
+    const uint32_t e = choose(pieces, emitters->piece_guide + t->first_cdf, entries, &u.x);
     const lx_vec2 local = lx_sample_triangle(u);
     const lx_vec2 b = piece_point(n, e / 2 / n, e / 2 % n, e % 2, local.x, local.y);
     out->u = b.x;

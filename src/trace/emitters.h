@@ -7,6 +7,10 @@
 /// One triangle of an emissive source. Textured ones are cut into grid² × 2 pieces of equal area (half of the table's entries lie
 /// outside the triangle and weigh nothing), so that bright texels get more samples.
 typedef struct lx_emitter_triangle {
+    lx_vec3 origin, edge1, edge2; ///< World: a point is origin + u edge1 + v edge2.
+    lx_vec3 normal;    ///< Unit, the shining side.
+    bool double_sided; ///< Shines from both sides.
+    bool plain;        ///< Radiance 1 everywhere: no texture, no holes.
     uint32_t surface, triangle;
     float probability; ///< Of being chosen within its source.
     float area;        ///< m²
@@ -18,13 +22,14 @@ typedef struct lx_emitters {
     lx_emitter_triangle *triangles; ///< Grouped by source.
     float *triangle_cdf;            ///< [triangle_count + source_count]; per source its triangles' running sum, starting at 0.
     float *piece_cdf;
+    uint32_t *triangle_guide, *piece_guide; ///< Beside the running sums: the step at which the search for u = k / count may begin.
     uint32_t *first_triangle;       ///< [source_count + 1]
     float *source_power;            ///< [source_count] sum of area × mean texture brightness, m²; 0 for sources that are not emissive.
     size_t triangle_count, piece_count;
 } lx_emitters;
 
 typedef struct lx_emitter_sample {
-    uint32_t surface, triangle;
+    const lx_emitter_triangle *triangle;
     float u, v;
     float pdf_area; ///< Density per m² within the source.
 } lx_emitter_sample;

@@ -147,32 +147,24 @@ static bool sample_area(const lx_light *light, const lx_receiver *r, lx_vec2 u, 
     return true;
 }
 
-static lx_vec3 triangle_normal(const lx_vec3 corner[3])
-{
-    return lx_normalize_or(lx_cross(lx_sub(corner[1], corner[0]), lx_sub(corner[2], corner[0])), (lx_vec3){0, 0, 0});
-}
-
 static bool sample_emissive(const lx_tracer *tracer, uint32_t source, const lx_receiver *r, lx_vec2 u, lx_ray *ray,
                             lx_rgb *irradiance)
 {
     lx_emitter_sample s;
     if (!lx_emitters_sample(&tracer->emitters, source, u, &s)) return false;
-    lx_vec3 corner[3];
-    lx_triangle_corners(tracer, s.surface, s.triangle, corner);
-    const lx_vec3 point = lx_add(lx_add(lx_scale(corner[0], 1 - s.u - s.v), lx_scale(corner[1], s.u)), lx_scale(corner[2], s.v));
-    lx_vec3 normal = lx_scale(triangle_normal(corner), tracer->surfaces[s.surface].orientation);
+    const lx_emitter_triangle *t = s.triangle;
+    const lx_vec3 point = lx_mad(lx_mad(t->origin, t->edge1, s.u), t->edge2, s.v);
     const lx_vec3 to_point = lx_sub(point, r->position);
-    const float distance2 = lx_dot(to_point, to_point);
-    if (!(distance2 > 0)) return false;
-    const lx_vec3 direction = lx_scale(to_point, 1 / sqrtf(distance2));
-    float emitter_cosine = -lx_dot(normal, direction);
-    if (emitter_cosine < 0 && tracer->scene->materials[tracer->scene->surfaces[s.surface].material].double_sided) {
-        emitter_cosine = -emitter_cosine;
-        normal = lx_neg(normal);
-    }
-    const float cosine = receiver_cosine(r, direction);
-    if (!(emitter_cosine > 0) || cosine == 0) return false;
-    const lx_rgb emission = lx_surface_emission(tracer, s.surface, s.triangle, s.u, s.v);
+    lx_vec3 normal = t->normal;
+    if (t->double_sided && lx_dot(normal, to_point) > 0) normal = lx_neg(normal);
+    const float facing = -lx_dot(normal, to_point);
+    if (!(facing > 0)) return false;
+    const float distance2 = lx_dot(to_point, to_point), distance = sqrtf(distance2);
+    const lx_vec3 direction = lx_scale(to_point, 1 / distance);
+    const float emitter_cosine = facing / distance, cosine = receiver_cosine(r, direction);
+    if (cosine == 0 || !(emitter_cosine > 0)) return false;
+    lx_rgb emission = {1, 1, 1};
+    if (!t->plain) emission = lx_surface_emission(tracer, t->surface, t->triangle, s.u, s.v);
     if (lx_rgb_is_black(emission)) return false;
     const float pdf = s.pdf_area * distance2 / emitter_cosine; // solid angle
     const float weight = power_heuristic(pdf, cosine / LX_PI);
