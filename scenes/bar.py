@@ -1107,7 +1107,7 @@ def make_lava_lamp(b, at):
 
 
 def make_fairy_lights(b):
-    """Two strings under the beams; all bulbs are one layer because their parent says so."""
+    """Two strings under the beams, each one node of many instances; one layer because their parent says so."""
     group = b.node("fairy_lights", layer="fairy")
     bulb = b.mesh(
         "fairy_bulb",
@@ -1120,7 +1120,6 @@ def make_fairy_lights(b):
     )
     cap = b.mesh("fairy_cap", (cylinder(0.0075, 0.016, 8), "black metal"))
     wire = Mesh()
-    k = 0
     hooks = [
         [
             (-X + 0.01, 2.86, 0.3),
@@ -1139,7 +1138,7 @@ def make_fairy_lights(b):
             (X - 0.01, 2.86, 1.6),
         ],
     ]
-    for string in hooks:
+    for k, string in enumerate(hooks, 1):
         path = []
         for a, c in zip(string, string[1:]):
             span = math.dist(a, c)
@@ -1156,11 +1155,15 @@ def make_fairy_lights(b):
                 )
         path.append(string[-1])
         wire.append(tube(path, 0.003, 5))
-        for i in range(2, len(path) - 1, 3):
-            x, y, z = path[i]
-            k += 1
-            b.node("fairy_cap_%d" % k, mesh=cap, at=(x, y - 0.016, z), parent=group, density=0.3)
-            b.node("fairy_%d" % k, mesh=bulb, at=(x, y - 0.05, z), parent=group)
+        places = path[2:-1:3]
+        for name, mesh, below, density in (("cap", cap, 0.016, 0.3), ("bulb", bulb, 0.05, 1)):
+            b.g.add_node(
+                "fairy_%s_%d" % (name, k),
+                mesh,
+                extras={"luxel_density": density},
+                parent=group,
+                instances=[((x, y - below, z), (0, 0, 0, 1), (1, 1, 1)) for x, y, z in places],
+            )
     b.node("fairy_wire", (wire, "black metal"), density=0.2)
 
 
