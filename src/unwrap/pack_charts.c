@@ -10,7 +10,12 @@
 #include <string.h>
 
 static const double rim_texels = 1e-3; // what a chart may reach into a texel without being counted there
-enum { max_levels = 13, hint_size = 24, many_charts = 1500 };
+enum {
+    max_levels = 13,
+    chunk_words = 16,   // columns that are looked at together: a place at the left spares looking at the right
+    hint_size = 24,     // charts up to this size remember how far up others of their size had to go,
+    many_charts = 1500, // where there are as many as this; and only two of the four turns are tried
+};
 
 // ---- Bitmaps ---------------------------------------------------------------------------------------------------------------
 
@@ -236,6 +241,7 @@ typedef struct sheet {
     uint32_t width, height, words, levels;
     uint64_t *bits;      // [levels][height][words]; beyond the width all is taken
     uint32_t *free_run;  // [height] upper bound of the longest free run
+    bool *stale;         // [height] the row has changed since its bound was found
     uint64_t *blocked;   // [words]
 } sheet;
 
@@ -248,29 +254,42 @@ static void sheet_release(sheet *s)
 {
     lx_free(s->bits);
     lx_free(s->free_run);
+    lx_free(s->stale);
     lx_free(s->blocked);
     *s = (sheet){0};
 }
 
-static void update_row(sheet *s, uint32_t y)
+// Rebuilds the upper levels after a change of columns [x0, x1).
+static void update_row(sheet *s, uint32_t y, uint32_t x0, uint32_t x1)
 {
-    uint32_t longest = 0;
-    for (uint32_t level = 0; level < s->levels; ++level) {
+    const uint32_t end = (x1 + 63) / 64 < s->words ? (x1 + 63) / 64 : s->words;
+    s->stale[y] = true;
+    for (uint32_t level = 1; level < s->levels; ++level) {
         uint64_t *row = sheet_row(s, level, y);
-        if (level > 0) {
-            const uint64_t *below = sheet_row(s, level - 1, y);
-            const uint32_t shift = 1u << (level - 1), whole = shift / 64, bits = shift % 64;
-            for (uint32_t w = 0; w < s->words; ++w) {
-                const uint64_t low = w + whole < s->words ? below[w + whole] : ~UINT64_C(0);
-                const uint64_t high = w + whole + 1 < s->words ? below[w + whole + 1] : ~UINT64_C(0);
-                row[w] = below[w] | (bits ? low >> bits | high << (64 - bits) : low);
-            }
+        const uint64_t *below = sheet_row(s, level - 1, y);
+        const uint32_t shift = 1u << (level - 1), whole = shift / 64, bits = shift % 64;
+        for (uint32_t w = x0 > 1u << level ? (x0 - (1u << level)) / 64 : 0; w < end; ++w) {
+            const uint64_t low = w + whole < s->words ? below[w + whole] : ~UINT64_C(0);
+            const uint64_t high = w + whole + 1 < s->words ? below[w + whole + 1] : ~UINT64_C(0);
+            row[w] = below[w] | (bits ? low >> bits | high << (64 - bits) : low);
         }
-        uint64_t all = ~UINT64_C(0);
-        for (uint32_t w = 0; w < s->words; ++w) all &= row[w];
-        if (all != ~UINT64_C(0)) longest = level + 1 < s->levels ? (2u << level) - 1 : s->width;
     }
-    s->free_run[y] = longest;
+}
+
+static uint32_t free_run(sheet *s, uint32_t y)
+{
+    if (!s->stale[y]) return s->free_run[y];
+    s->stale[y] = false;
+    s->free_run[y] = 0;
+    for (uint32_t level = s->levels; level-- > 0;) {
+        const uint64_t *row = sheet_row(s, level, y);
+        uint32_t w = 0;
+        while (w < s->words && row[w] == ~UINT64_C(0)) ++w;
+        if (w == s->words) continue;
+        s->free_run[y] = level + 1 < s->levels ? (2u << level) - 1 : s->width;
+        break;
+    }
+    return s->free_run[y];
 }
 
 static bool sheet_init(sheet *s, uint32_t width, uint32_t height, uint32_t longest_run)
@@ -279,14 +298,15 @@ static bool sheet_init(sheet *s, uint32_t width, uint32_t height, uint32_t longe
     while (s->levels < max_levels && (2u << (s->levels - 1)) <= longest_run) ++s->levels;
     s->bits = lx_calloc_array((size_t)s->words * height * s->levels, sizeof *s->bits);
     s->free_run = lx_malloc_array(height, sizeof *s->free_run);
+    s->stale = lx_malloc_array(height, sizeof *s->stale);
     s->blocked = lx_malloc_array(s->words, sizeof *s->blocked);
-    if (!s->bits || !s->free_run || !s->blocked) {
+    if (!s->bits || !s->free_run || !s->stale || !s->blocked) {
         sheet_release(s);
         return false;
     }
     for (uint32_t y = 0; y < height; ++y) {
         if (width % 64) sheet_row(s, 0, y)[s->words - 1] = ~UINT64_C(0) << (width % 64);
-        update_row(s, y);
+        update_row(s, y, 0, width);
     }
     return true;
 }
@@ -329,22 +349,22 @@ static bool find_place(sheet *on, const shape *s, uint32_t border, uint32_t y, u
     if (max_top < height) return false;
     if (max_top - height < last_y) last_y = max_top - height;
     for (; y <= last_y; ++y) {
-        if (on->free_run[y + s->runs[0].y] < s->runs[0].length) continue;
+        if (free_run(on, y + s->runs[0].y) < s->runs[0].length) continue;
         memset(on->blocked, 0, words * sizeof *on->blocked);
         set_run(on->blocked, 0, border);
         set_run(on->blocked, last_x + 1, words * 64);
-        range open = shrink(on->blocked, (range){0, words});
-        for (size_t i = 0; i < s->run_count && open.first < open.end; ++i) {
-            const run r = s->runs[i];
-            uint32_t level = 31u - (uint32_t)__builtin_clz(r.length);
-            if (level >= on->levels) level = on->levels - 1;
-            const uint64_t *row = sheet_row(on, level, y + r.y);
-            open = block(on->blocked, open, row, words, r.x);
-            if (r.length > 1u << level) open = block(on->blocked, open, row, words, r.x + r.length - (1u << level));
-        }
-        if (open.first < open.end) {
-            const uint32_t w = open.first; // shrink() left a free column in it
-            *out_x = w * 64 + (uint32_t)__builtin_ctzll(~on->blocked[w]);
+        for (uint32_t chunk = 0; chunk < words; chunk += chunk_words) {
+            range open = shrink(on->blocked, (range){chunk, chunk + chunk_words < words ? chunk + chunk_words : words});
+            for (size_t i = 0; i < s->run_count && open.first < open.end; ++i) {
+                const run r = s->runs[i];
+                uint32_t level = 31u - (uint32_t)__builtin_clz(r.length);
+                if (level >= on->levels) level = on->levels - 1;
+                const uint64_t *row = sheet_row(on, level, y + r.y);
+                open = block(on->blocked, open, row, words, r.x);
+                if (r.length > 1u << level) open = block(on->blocked, open, row, words, r.x + r.length - (1u << level));
+            }
+            if (open.first == open.end) continue;
+            *out_x = open.first * 64 + (uint32_t)__builtin_ctzll(~on->blocked[open.first]); // shrink() left a free column in it
             *out_y = y;
             return true;
         }
@@ -367,7 +387,7 @@ static void occupy(sheet *on, const bitmap *dilated, uint32_t by, uint32_t x, ui
             for (uint32_t w = 0; w < dilated->words && w < on->words; ++w)
                 to[w] |= from[w] >> cut | (w + 1 < dilated->words ? from[w + 1] << (64 - cut) : 0);
         }
-        update_row(on, row);
+        update_row(on, row, x >= by ? x - by : 0, x - by + dilated->width);
     }
 }
 
