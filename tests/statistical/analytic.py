@@ -3,7 +3,7 @@
 
     analytic.py --list                  names of the cases
     analytic.py LUXEL [CASE...]         runs them with this program
-    analytic.py LUXEL --table [CASE...] the same, as the table of docs/accuracy.md
+    analytic.py LUXEL --table [CASE...] the same, as the tables of docs/accuracy.md
 
 A case is a function of selftest.py, lamps.py, emitters.py, skies.py, panes.py, bounces.py or bakes.py. It makes a scene, lets Luxel compute
 irradiance in it, and compares with what oracle.py says, which shares nothing with Luxel's sources. Seeds are fixed: a case passes
@@ -20,16 +20,23 @@ import measure
 import selftest, lamps, emitters, skies, panes, bounces, bakes, convergence
 
 
-def number(value):
-    return "%.4g" % value
+GROUPS = {"lamps": "Lamps", "emitters": "Emissive surfaces", "skies": "Skies", "panes": "Panes, holes, glass",
+          "bounces": "Bounced light, scales, leaks", "bakes": "Baked texels and layers", "convergence": "Convergence",
+          "selftest": "The oracles themselves"}
 
 
 def print_table():
-    print("| case | compared | points | samples | expected | got | relative error | allowed |")
-    print("|---|---|---|---|---|---|---|---|")
-    for name, row in measure.ROWS:
-        print("| %s | %s | %d | %d | %.6g | %.6g | %.1e | %g |" % (name.replace("_", " "), row.what, row.points, row.samples,
-                                                                 row.expected, row.got, row.error, row.tolerance))
+    for module, title in GROUPS.items():
+        rows = [(name, row) for name, row in measure.ROWS if measure.CASES[name].__module__ == module]
+        if not rows:
+            continue
+        print("### %s\n" % title)
+        print("| case | what is compared | points | samples | expected | got | error | allowed |")
+        print("|---|---|--:|--:|--:|--:|--:|--:|")
+        for name, row in rows:
+            print("| %s | %s | %d | %s | %.6g | %.6g | %.1e | %g |" % (name.replace("_", " "), row.what, row.points, row.samples or "–",
+                                                                     row.expected, row.got, row.error, row.tolerance))
+        print()
 
 
 def run(name):

@@ -105,10 +105,6 @@ COLORS = ("#0b6fb3", "#d1495b", "#2e8b57", "#c77700", "#6a4c93")
 WIDTH, HEIGHT, LEFT, TOP, RIGHT, BOTTOM = 760, 500, 78, 30, 24, 64
 
 
-def superscript(power):
-    return "10" + "".join("⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".index(c)] for c in str(power))
-
-
 def draw(rows, path):
     """rows: (what, samples, error)."""
     low = math.floor(math.log10(min(e for _, _, e in rows)))
@@ -128,26 +124,32 @@ def draw(rows, path):
 
     def text(x, y, words, style=""):
         svg.append('<text x="%.1f" y="%.1f" %s>%s</text>' % (x, y, style, words))
+
+    def power_of(base, exponent, x, y):
+        """The base ends at x, its exponent begins there."""
+        text(x, y, base, 'text-anchor="end"')
+        text(x + 1, y - 6, str(exponent).replace("-", "\u2212"), 'font-size="10"')
     for count in COUNTS:
         line(x_of(count), TOP, x_of(count), HEIGHT - BOTTOM, 'stroke="#e4e4e4"')
-        text(x_of(count), HEIGHT - BOTTOM + 20, "2" + superscript(int(math.log2(count)))[2:], 'text-anchor="middle"')
+        power_of(2, int(math.log2(count)), x_of(count) + 2, HEIGHT - BOTTOM + 22)
     for power in range(low, high + 1):
         line(LEFT, y_of(10.0 ** power), WIDTH - RIGHT, y_of(10.0 ** power), 'stroke="#e4e4e4"')
-        text(LEFT - 10, y_of(10.0 ** power) + 5, superscript(power), 'text-anchor="end"')
+        power_of(10, power, LEFT - 22, y_of(10.0 ** power) + 6)
     svg.append('<rect x="%d" y="%d" width="%d" height="%d" fill="none" stroke="#888"/>' %
                (LEFT, TOP, WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM))
     text((LEFT + WIDTH - RIGHT) / 2, HEIGHT - 18, "samples per point", 'text-anchor="middle"')
-    text(20, (TOP + HEIGHT - BOTTOM) / 2, "relative error (root mean square of 16 points)",
-         'text-anchor="middle" transform="rotate(-90 20 %.1f)"' % ((TOP + HEIGHT - BOTTOM) / 2))
+    text(0, 0, "relative error (root mean square of 16 points)",
+         'text-anchor="middle" transform="translate(22 %.1f) rotate(-90)"' % ((TOP + HEIGHT - BOTTOM) / 2))
     start = 0.3
     line(x_of(COUNTS[0]), y_of(start), x_of(COUNTS[-1]), y_of(start * (COUNTS[0] / COUNTS[-1]) ** 0.5),
          'stroke="#999" stroke-dasharray="6 5"')
     text(x_of(2 ** 17), y_of(start * (COUNTS[0] / 2 ** 17) ** 0.5) - 8, "1/√N", 'fill="#777"')
     names = list(dict.fromkeys(name for name, _, _ in rows))
     for k, name in enumerate(names):
-        style = 'fill="none" stroke="%s" stroke-width="2"' % COLORS[k]
+        style = 'stroke="%s" stroke-width="2"' % COLORS[k]
         spots = [(x_of(n), y_of(e)) for what, n, e in rows if what == name]
-        svg.append('<polyline points="%s" %s/>' % (" ".join("%.1f,%.1f" % s for s in spots), style))
+        for (x0, y0), (x1, y1) in zip(spots, spots[1:]):
+            line(x0, y0, x1, y1, style)
         for x, y in spots:
             svg.append('<circle cx="%.1f" cy="%.1f" r="3.5" fill="%s"/>' % (x, y, COLORS[k]))
         y = HEIGHT - BOTTOM - 16 - 20 * (len(names) - 1 - k)
