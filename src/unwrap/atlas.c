@@ -200,19 +200,20 @@ static void keep_scene_atlas(lx_unwrap_job *job)
     atlas->texels_per_m = (float)((double)atlas->page_size * sqrt(uv_area / area));
 }
 
-// A chart longer than a page would keep the density of the whole scene down. At the asked density, or at the one that would
-// use three quarters of the texels, it has to fit; so does a square or a disk that has the page to itself.
+// A chart longer than a page would keep the density of the whole scene down. At the density that would use three quarters of
+// the texels it has to fit; so does a square or a disk that has the page to itself. A lower density that was asked for allows
+// longer ones; a higher one will not fit anyway.
 static double longest_chart(const lx_unwrap_job *job)
 {
     const double page = (double)job->desc.page_size, border = (job->desc.padding + 1) / 2;
-    if (job->desc.texels_per_m > 0) return (page - 2 * border - 1) / (double)job->desc.texels_per_m;
     double area = 0;
     for (uint32_t m = 0; m < job->mesh_count; ++m)
         for (uint32_t i = 0; i < job->meshes[m].instance_count; ++i) {
             const double size = job->meshes[m].size * (double)job->ratios[job->instances[job->meshes[m].first_instance + i]];
             area += size * size;
         }
-    return 1.15 * sqrt(area / job->desc.max_pages);
+    const double longest = 1.15 * sqrt(area / job->desc.max_pages);
+    return job->desc.texels_per_m > 0 ? fmax(longest, (page - 2 * border - 1) / (double)job->desc.texels_per_m) : longest;
 }
 
 static void warn_of_flaws(const lx_unwrap_job *job)

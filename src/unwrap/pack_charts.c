@@ -404,12 +404,12 @@ typedef struct packer {
     uint32_t longest;
 } packer;
 
-typedef struct sort_key { float longest, area; uint32_t chart; } sort_key;
+typedef struct sort_key { uint64_t texels; float area; uint32_t chart; } sort_key; // of its rectangle, padding included
 
 static int compare_keys(const void *pa, const void *pb)
 {
     const sort_key *a = pa, *b = pb;
-    if (a->longest != b->longest) return a->longest > b->longest ? -1 : 1;
+    if (a->texels != b->texels) return a->texels > b->texels ? -1 : 1;
     if (a->area != b->area) return a->area > b->area ? -1 : 1;
     return a->chart < b->chart ? -1 : a->chart > b->chart;
 }
@@ -511,8 +511,7 @@ lx_result lx_pack_charts(const lx_chart_set *set, double texels_per_m, uint32_t 
         if (large > longest) longest = large;
         if (small > narrowest) narrowest = small;
         cells += chart_texels(chart, scales[c], padding);
-        const double extent = fmax((double)chart->width, (double)chart->height);
-        keys[c] = (sort_key){(float)(extent * scales[c]), chart->area, c};
+        keys[c] = (sort_key){(uint64_t)(w + padding) * (h + padding), chart->area, c};
     }
     if (cells * 0.6 > (double)limit * limit) goto cleanup; // hopeless; the search does not need to know how hopeless
     qsort(keys, count, sizeof *keys, compare_keys);
