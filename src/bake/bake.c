@@ -2,6 +2,7 @@
 // and the settings, so any number of threads gives the same bits.
 #include "bake/bake.h"
 
+#include "bake/advice.h"
 #include "bake/layers.h"
 #include "bake/luxels.h"
 #include "base/clock.h"
@@ -296,20 +297,24 @@ static void summarise(bake_job *job, uint32_t workers, double start)
     s->seconds = lx_seconds() - start;
 }
 
-// A layer without any light is almost always a mistake: a lamp inside its own shade, an emissive mesh turned inside out.
-static void warn_black_layers(const lx_bake *bake)
+// A few places of the first tile of each page stand for all.
+static void check_sum_of_layers(const bake_job *job)
 {
-    const size_t value_count = 3 * (size_t)bake->atlas->page_size * bake->atlas->page_size;
-    for (uint32_t layer = 0; layer < bake->layer_count; ++layer) {
-        bool black = true;
-        for (uint32_t page = 0; black && page < bake->atlas->page_count; ++page) {
-            const float *image = lx_bake_image(bake, page, layer);
-            for (size_t i = 0; black && i < value_count; ++i) black = !(image[i] > 0);
+    enum { points_per_page = 16 };
+    lx_receiver points[points_per_page];
+    uint32_t last_page = UINT32_MAX;
+    for (size_t i = 0; i < job->tile_count && !job->bake->desc.combined; ++i) {
+        const luxel_tile *tile = &job->tiles[i];
+        if (tile->page == last_page) continue;
+        last_page = tile->page;
+        tile_scratch *s = &job->scratch[0];
+        const uint32_t texels = collect_texels(job, tile, s), count = texels < points_per_page ? texels : points_per_page;
+        for (uint32_t k = 0; k < count; ++k) {
+            const uint32_t texel = s->texels[k * texels / count], size = job->bake->atlas->page_size;
+            lx_luxel_sites(job->bake, &job->pages[tile->page], texel % size, texel / size, texel_stream(job, tile->page, texel), 1,
+                           &points[k]);
         }
-        if (black)
-            lx_log_warning(bake->scene->context->log,
-                           "layer '%s' (%s) lights nothing: is it enclosed, facing away or outside the scene?",
-                           bake->layers[layer].name, bake->layers[layer].node[0] ? bake->layers[layer].node : "sky");
+        lx_layers_check(job->bake, s->batch, points, count);
     }
 }
 
@@ -332,6 +337,7 @@ lx_result lx_bake_run(lx_bake *bake, const lx_progress_sink *progress, lx_error 
         goto cleanup;
     }
     LX_TRY(create_scratch(&job, workers, error));
+    lx_advise_on_scene(bake);
     LX_TRY(lx_pool_run(pool, atlas->page_count, rasterise_page, &job, "luxels", progress, error));
     LX_TRY(list_tiles(&job, error));
     weights = lx_malloc_array(job.tile_count, sizeof *weights);
@@ -343,7 +349,8 @@ lx_result lx_bake_run(lx_bake *bake, const lx_progress_sink *progress, lx_error 
     LX_TRY(lx_pool_run_weighted(pool, job.tile_count, weights, bake_tile, &job, "bake", progress, error));
     LX_TRY(lx_pool_run(pool, atlas->page_count, fill_page, &job, "post", progress, error));
     summarise(&job, workers, start);
-    warn_black_layers(bake);
+    check_sum_of_layers(&job);
+    lx_advise_on_layers(bake);
 cleanup:
     release_job(&job, workers);
     lx_free(weights);

@@ -238,6 +238,37 @@ cleanup:
     return result;
 }
 
+void lx_layers_check(const lx_bake *bake, lx_path_batch *batch, const lx_receiver *points, uint32_t count)
+{
+    enum { samples = 4 };
+    lx_source_use *combined = lx_uses_combined(bake->tracer);
+    double *sums = lx_calloc_array(bake->layer_count, 3 * sizeof *sums);
+    double worst = 0;
+    lx_path_settings settings = {.tracer = bake->tracer, .bounces = bake->desc.transport.bounces, .direct = true, .indirect = true};
+    for (uint32_t i = 0; combined && sums && i < count; ++i) {
+        lx_path_start starts[samples];
+        for (uint32_t k = 0; k < samples; ++k)
+            starts[k] = (lx_path_start){.receiver = points[i], .weight = {1, 1, 1}, .stream = lx_stream_key(i, 0x636865u, 0), .sample = k};
+        memset(sums, 0, 3 * bake->layer_count * sizeof *sums);
+        double whole[3] = {0, 0, 0}, sum[3] = {0, 0, 0};
+        settings.uses = bake->uses;
+        settings.layer_count = bake->layer_count;
+        lx_path_trace(batch, &settings, starts, samples, sums, NULL);
+        settings.uses = combined;
+        settings.layer_count = 1;
+        lx_path_trace(batch, &settings, starts, samples, whole, NULL);
+        for (uint32_t layer = 0; layer < bake->layer_count; ++layer)
+            for (int c = 0; c < 3; ++c)
+                sum[c] += sums[3 * layer + (size_t)c] * (double)bake->layers[layer].color[c] * (double)bake->layers[layer].intensity;
+        for (int c = 0; c < 3; ++c)
+            if (whole[c] > 0) worst = fmax(worst, fabs(sum[c] / whole[c] - 1));
+    }
+    if (worst > 1e-5)
+        lx_log_warning(bake->scene->context->log, "the sum of layers differs from the combined light by %.2g: please report this scene", worst);
+    lx_free(combined);
+    lx_free(sums);
+}
+
 void lx_layers_release(lx_bake *bake)
 {
     for (uint32_t i = 0; i < bake->layer_count; ++i) lx_free(bake->layers[i].name);

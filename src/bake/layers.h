@@ -8,6 +8,10 @@
 lx_result lx_layers_build(lx_bake *bake, lx_error *error);
 void lx_layers_release(lx_bake *bake);
 
+/// Traces a few paths from `points` twice, once into layers and once combined, and warns if the sum of layers times colours is not what was
+/// combined: it is the promise that everything rests on.
+void lx_layers_check(const lx_bake *bake, lx_path_batch *batch, const lx_receiver *points, uint32_t count);
+
 /// Uses that put every source into layer 0 at its authored colour; [source count], owned by the caller; NULL: no memory.
 lx_source_use *lx_uses_combined(const lx_tracer *tracer);
 
