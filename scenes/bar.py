@@ -1238,7 +1238,7 @@ def make_pictures(b):
     )
     b.node("picture_lamp", (arm, "brass"), at=(-X, 0, -0.42), turn=FACE_RIGHT)
     lamp = b.g.add_light("spot", 12.0, (1.0, 0.84, 0.62), "picture_light", inner=20, outer=55)
-    eye = (-X + 0.2, 2.17, -0.42)
+    eye = (-X + 0.2, 2.162, -0.42)
     b.node("picture_light", light=lamp, at=eye, rotation=look(eye, (-X, 1.62, -0.42)), radius=0.015)
 
 
