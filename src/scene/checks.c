@@ -90,7 +90,7 @@ static void advise_on_emitters(const lx_scene *scene, lx_light_units units)
 static void advise_on_lights(const lx_scene *scene)
 {
     if (scene->source_count > 0) return;
-    lx_log_warning(scene->context->log, "scene: no lights and no emissive materials; without a sky all will be black");
+    lx_log_note(scene->context->log, "scene: no lights and no emissive materials; without a sky all will be black");
 }
 
 static void advise_blender_user(const lx_scene *scene, bool file_has_lights, bool has_extras)
