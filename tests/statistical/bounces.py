@@ -78,8 +78,8 @@ def furnace_seen_from_free_points_inside_is_the_same():
     for _ in range(20):
         d = v_norm(tuple(rng.gauss(0, 1) for _ in range(3)))
         points.append((tuple(rng.uniform(-0.9, 0.9) for _ in range(3)), d))
-    got = irradiance(furnace((0.5,) * 3), points, 8192, "inf")
-    compare("anywhere inside", grey([10 * math.pi] * 20), got, 0.01, 8192)
+    got = irradiance(furnace((0.5,) * 3), points, 16384, "inf")
+    compare("anywhere inside", grey([10 * math.pi] * 20), got, 0.01, 16384)
 
 
 @case
