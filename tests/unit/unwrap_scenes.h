@@ -429,7 +429,8 @@ static inline atlas_facts check_atlas(const lx_atlas *atlas, bool new_charts)
                         if (depth > 2e-3) fail_msg("triangles %u and %u overlap by %g texels", m, n, depth);
                     }
             for (uint32_t c = 0; c < chart_count && new_charts; ++c) {
-                if (!(extents[c] > 2)) continue; // smaller ones are enlarged to a texel
+                // Smaller ones are enlarged to a texel; the area of needles is mostly rounding of their coordinates.
+                if (!(extents[c] > 2) || !(flat[c] > 0.01)) continue;
                 const double relative = sqrt(flat[c] / world[c]) / asked[c];
                 facts.lowest_density = fmin(facts.lowest_density, relative);
                 facts.highest_density = fmax(facts.highest_density, relative);
