@@ -86,7 +86,7 @@ static bool counts(const lx_path_settings *settings, const lx_source_use *use, u
 }
 
 // Roulette on light samples after the first bounce: in a room of many lamps most of them are far away from any one vertex, and what a sample
-// could bring is far below the noise of the path itself. What brings less than the source's mean irradiance in the scene is looked at with that
+// could bring is far below the noise of the path itself. What brings less than the source's scale is looked at with that
 // probability and weighs accordingly more, so the expectation stays. Depends on the path and its source alone, never on other sources.
 // Returns 1 / probability, 0 if the sample is skipped.
 static float roulette(const path *p, uint32_t key, float brings, float scale)

@@ -218,14 +218,16 @@ static lx_result build_scales(lx_tracer *tracer, lx_error *error)
 {
     tracer->source_scales = lx_calloc_array(tracer->source_count, sizeof(float));
     if (!tracer->source_scales) return lx_fail_memory(error, "sources");
-    const double area = total_area(tracer);
+    // A share of the mean: small enough that the roulette it decides adds no noise that shows even where nothing but one lamp lights the
+    // scene (docs/accuracy.md, two plates), large enough to spare the far lamps of a hall.
+    const double share = 0.05, area = total_area(tracer);
     for (uint32_t i = 0; i < tracer->source_count; ++i) {
         const lx_source_kind kind = lx_tracer_source(tracer, i)->kind;
-        // Sun and sky have no flux of their own: a tenth of what they give in the open.
-        tracer->source_scales[i] = kind == LX_SOURCE_DIRECTIONAL ? 0.1f
-                                   : kind == LX_SOURCE_SKY       ? 0.1f * LX_PI
-                                   : area > 0                    ? (float)(unit_flux(tracer, i) / area)
-                                                                 : 0;
+        double mean = area > 0 ? unit_flux(tracer, i) / area : 0;
+        // Sun and sky have no flux of their own; a tenth of what they give in the open stands for it.
+        if (kind == LX_SOURCE_DIRECTIONAL) mean = 0.1;
+        if (kind == LX_SOURCE_SKY) mean = 0.1 * (double)LX_PI;
+        tracer->source_scales[i] = (float)(share * mean);
     }
     return LX_OK;
 }

@@ -38,7 +38,7 @@ struct lx_tracer {
     lx_sky sky;
     lx_source sky_source;
     uint32_t *source_keys;       ///< [source count] random stream of each source, from its name: see lx_tracer_source_key.
-    float *source_scales;        ///< [source count] irradiance that a source of strength 1 would give if its flux were spread evenly over all surfaces.
+    float *source_scales;        ///< [source count] a small share of the mean irradiance that a source of strength 1 gives the scene's surfaces.
     lx_source_sphere *source_spheres; ///< [source count]
     uint32_t source_count;
 };
