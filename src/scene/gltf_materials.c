@@ -49,6 +49,24 @@ cleanup:
     return result;
 }
 
+// Every object with an `index` below a material is a use of a texture, those of extensions included. `extras` may hold anything.
+static uint32_t sampled_texcoords(const json_t *value)
+{
+    uint32_t bits = 0;
+    const char *key;
+    json_t *member;
+    if (json_is_integer(json_object_get(value, "index"))) {
+        const json_t *transform = json_object_get(json_object_get(value, "extensions"), "KHR_texture_transform");
+        const json_t *texcoord = json_object_get(transform, "texCoord");
+        if (!texcoord) texcoord = json_object_get(value, "texCoord");
+        const json_int_t set = json_integer_value(texcoord); // 0 without one
+        if (set >= 0 && set < 32) bits |= 1u << set;
+    }
+    json_object_foreach((json_t *)value, key, member)
+        if (strcmp(key, "extras") != 0 && json_is_object(member)) bits |= sampled_texcoords(member);
+    return bits;
+}
+
 static lx_result read_unit_float(const lx_gltf_object *object, const char *key, float *value, lx_error *error)
 {
     const lx_result result = lx_gltf_get_float(object, key, value, error);
@@ -178,6 +196,7 @@ static lx_result read_material(lx_gltf_reader *reader, uint32_t index, lx_materi
     out->file_index = (int32_t)index;
     LX_TRY(lx_gltf_element(reader, LX_GLTF_MATERIAL, index, &object, error));
     LX_TRY(lx_gltf_keep_string(reader, json_string_value(json_object_get(object.json, "name")), &out->name, error));
+    out->sampled_texcoords = sampled_texcoords(object.json);
     LX_TRY(read_metallic_roughness(reader, &object, out, error));
     LX_TRY(read_specular_glossiness(reader, &object, out, error));
     LX_TRY(read_emission(reader, &object, out, error));

@@ -57,7 +57,7 @@ void lx_scene_destroy(lx_scene *scene)
 
 bool lx_material_emits(const lx_material *material)
 {
-    return material->emissive_strength > 0 && lx_rgb_max(material->emissive_factor) > 0;
+    return !material->unlit && material->emissive_strength > 0 && lx_rgb_max(material->emissive_factor) > 0;
 }
 
 void lx_text_free(char *text) { lx_free(text); }

@@ -53,6 +53,7 @@ typedef struct lx_material {
     lx_texture_slot metallic_roughness_texture; ///< G roughness, B metallic.
     lx_texture_slot emissive_texture;           ///< sRGB.
     lx_texture_slot transmission_texture;       ///< R.
+    uint32_t sampled_texcoords; ///< Bit n: some texture of the material, also one the baker ignores (a normal map), samples TEXCOORD_n.
     lx_alpha_mode alpha_mode;
     float alpha_cutoff;
     bool double_sided, unlit;
@@ -183,7 +184,7 @@ lx_vec4 lx_texture_sample(const lx_scene *scene, const lx_texture_slot *slot, lx
 /// True if a texel of the image has alpha below 1, i.e. the slot can let light through.
 bool lx_texture_has_alpha(const lx_scene *scene, const lx_texture_slot *slot);
 
-/// True if the material emits: factor and strength above zero. (Its texture may still be black.)
+/// True if the material emits: factor and strength above zero, and not unlit, which ignores emission. (Its texture may still be black.)
 bool lx_material_emits(const lx_material *material);
 
 #endif

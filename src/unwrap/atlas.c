@@ -241,17 +241,26 @@ static lx_result build(lx_unwrap_job *job, lx_error *error)
     if (!job->desc.force_unwrap) {
         LX_TRY(lx_unwrap_run(job, read_set, 0.1, error));
         LX_TRY(find_scene_atlas(job, &found, &flaw, error));
-        if (!found && flaw)
-            lx_log_warning(job->scene->context->log, "the file's TEXCOORD_1 atlas %s at %u texels; its meshes are packed anew", flaw,
-                           job->desc.page_size);
         if (!found) LX_TRY(lx_unwrap_run(job, judge_set, 0.15, error));
     }
     if (found) {
         keep_scene_atlas(job);
     } else {
         LX_TRY(lx_unwrap_run(job, lx_unwrap_mesh, 0.5, error));
-        LX_TRY(lx_choose_density(job, error));
-        warn_of_flaws(job);
+        result = lx_choose_density(job, error);
+        // Rather light that bleeds a little between charts than no light at all: the page is too small for anything better.
+        if (result == LX_ERROR_LIMIT && flaw) {
+            lx_log_warning(job->scene->context->log, "the file's TEXCOORD_1 atlas %s at %u texels, and nothing better fits; it is used as it is",
+                           flaw, job->desc.page_size);
+            keep_scene_atlas(job);
+            result = LX_OK;
+        } else if (result == LX_OK) {
+            if (flaw)
+                lx_log_warning(job->scene->context->log, "the file's TEXCOORD_1 atlas %s at %u texels; its meshes are packed anew",
+                               flaw, job->desc.page_size);
+            warn_of_flaws(job);
+        }
+        if (result != LX_OK) goto cleanup;
     }
     LX_TRY(lx_unwrap_run(job, lx_write_mesh, 1, error));
 cleanup:

@@ -216,22 +216,17 @@ static lx_result write_set(const lx_unwrap_job *job, lx_mesh_job *mesh, lx_error
 // a texture that would ask for one) gets set 0.
 static uint32_t free_texcoord(const lx_scene *scene, const lx_mesh *mesh)
 {
-    bool present[lx_texcoord_sets] = {false}, sampled[lx_texcoord_sets] = {false}, any = false;
+    bool present[lx_texcoord_sets] = {false}, any = false;
+    uint32_t sampled = 0;
     for (uint32_t i = 0; i < mesh->primitive_count; ++i) {
         const lx_primitive *primitive = &scene->primitives[mesh->first_primitive + i];
-        const lx_material *m = &scene->materials[primitive->material];
-        const lx_texture_slot *slots[] = {&m->base_color_texture, &m->metallic_roughness_texture, &m->emissive_texture,
-                                          &m->transmission_texture};
+        sampled |= scene->materials[primitive->material].sampled_texcoords;
         for (uint32_t n = 0; n < lx_texcoord_sets; ++n) any |= present[n] |= primitive->texcoords[n] != NULL;
-        for (size_t k = 0; k < sizeof slots / sizeof *slots; ++k) {
-            if (slots[k]->texture < 0 || slots[k]->texcoord >= lx_texcoord_sets) continue;
-            any |= sampled[slots[k]->texcoord] = true;
-        }
     }
-    if (!any) return 0;
-    if (!sampled[1]) return 1; // a set 1 that is there is bad: replaced
+    if (!any && !sampled) return 0;
+    if (!(sampled & 2)) return 1; // a set 1 that is there is bad: replaced
     uint32_t n = 2;
-    while (n < lx_texcoord_sets && (present[n] || sampled[n])) ++n;
+    while (n < lx_texcoord_sets && (present[n] || sampled >> n & 1)) ++n;
     return n;
 }
 

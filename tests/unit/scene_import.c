@@ -22,7 +22,7 @@ static void triangle_without_indices_is_read_in_vertex_order(void **state)
     assert_string_equal(scene->instances[0].name, "tri");
     assert_int_equal(scene->triangle_count, 1);
     assert_vec3(scene->bounds.high, 1, 1, 0);
-    assert_logged("warning: scene: no lights");
+    assert_logged("note: scene: no lights");
     lx_scene_destroy(scene);
 }
 
@@ -563,7 +563,8 @@ static void material_factors_are_read(void **state)
     assert_int_equal(m->alpha_mode, LX_ALPHA_MASK);
     assert_near(m->alpha_cutoff, 0.75, 0);
     assert_true(m->double_sided && m->unlit);
-    assert_true(lx_material_emits(m));
+    assert_false(lx_material_emits(m)); // unlit materials ignore emission
+    assert_int_equal(m->sampled_texcoords, 0);
     lx_scene_destroy(scene);
 }
 

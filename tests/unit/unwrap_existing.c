@@ -222,7 +222,7 @@ static void a_texture_on_set_one_sends_the_lightmap_to_the_next_free_set(void **
         place(b, add_quad(b, "textured", 1, 1));
         set_uv(b, 0, 3, 0, 0);
         b->scene.materials[0].base_color_texture.texture = 0;
-        b->scene.materials[0].base_color_texture.texcoord = 1;
+        b->scene.materials[0].sampled_texcoords = 1u << 1; // by any texture, a normal map too
         if (with_set_2) b->scene.primitives[0].texcoords[2] = calloc(4, sizeof(lx_vec2));
         lx_atlas *atlas = build_atlas(b, NULL);
         assert_false(atlas->meshes[0].existing);
@@ -239,7 +239,7 @@ static void meshes_without_any_set_get_set_zero_unless_a_texture_wants_it(void *
     place(b, add_quad(b, "plain", 1, 1));
     place(b, add_quad(b, "textured", 1, 1));
     const uint32_t textured = add_material(b, false, 1);
-    b->scene.materials[textured].base_color_texture.texture = 0;
+    b->scene.materials[textured].sampled_texcoords = 1u << 0;
     b->scene.primitives[1].material = textured;
     lx_atlas *atlas = build_atlas(b, NULL);
     assert_int_equal(atlas->meshes[0].texcoord, 0);
