@@ -40,8 +40,8 @@ lx_result lx_render_scene(const lx_scene *scene, const lx_render_desc *desc, con
     lx_tracer *tracer = NULL;
     lx_source_use *uses = NULL;
     lx_view_rays view;
-    LX_TRY(lx_view_choose(scene, desc, &view, error));
     LX_TRY(lx_tracer_create(scene, &desc->transport, true, &tracer, error));
+    LX_TRY(lx_view_choose(tracer, desc, &view, error));
     uses = lx_uses_combined(tracer);
     if (!uses) {
         result = lx_fail_memory(error, "picture");
@@ -109,8 +109,8 @@ lx_result lx_render_baked(lx_baked *baked, const lx_render_desc *desc, bool refe
     lx_transport_desc transport = desc->transport;
     transport.sky = baked->sky;
     const uint32_t page_count = lx_baked_page_count(baked);
-    LX_TRY(lx_view_choose(baked->scene, desc, &view, error));
     LX_TRY(lx_tracer_create(baked->scene, &transport, true, &tracer, error));
+    LX_TRY(lx_view_choose(tracer, desc, &view, error));
     uses = current_uses(baked, tracer, false);
     pages = lx_calloc_array(page_count, sizeof *pages);
     if (!uses || !pages) {

@@ -12,8 +12,9 @@ typedef struct lx_view_rays {
     bool perspective;
 } lx_view_rays;
 
-/// The camera a desc asks for: by name, by index, the file's first, or one that frames the scene. A wrong name lists those that exist.
-lx_result lx_view_choose(const lx_scene *scene, const lx_render_desc *desc, lx_view_rays *out, lx_error *error);
+/// The camera a desc asks for: by place, by name, by index, the file's first, or one that frames the scene from the side that shows most. A
+/// wrong name lists those that exist.
+lx_result lx_view_choose(const lx_tracer *tracer, const lx_render_desc *desc, lx_view_rays *out, lx_error *error);
 /// Ray through (x, y) in 0…1, from the top left. Unit direction.
 lx_ray lx_view_ray(const lx_view_rays *view, float x, float y);
 
