@@ -54,7 +54,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     size_t needed;
     if (lxrt_memory_bytes(data, size, &needed) != LXRT_OK) return 0;
     void *memory = malloc(needed);
-    lxrt_pack *pack;
+    lxrt_pack *pack = NULL;
     lxrt_info info;
     require(memory != NULL && lxrt_open(data, size, memory, needed, &pack) == LXRT_OK);
     lxrt_get_info(pack, &info);
