@@ -160,6 +160,7 @@ static void trace_texels(const bake_job *job, const luxel_tile *tile, tile_scrat
             s->starts[filled++] = (lx_path_start){.receiver = s->sites[(size_t)i * most_sites + site], .weight = {1, 1, 1},
                                                   .stream = stream, .sample = sample, .target = i};
             if (filled == lx_path_batch_size) {
+                if (lx_pool_is_stopping(job->bake->scene->context->pool)) return;
                 lx_path_trace(s->batch, &job->settings, s->starts, filled, s->sums, s->back_hits);
                 filled = 0;
             }

@@ -11,6 +11,7 @@
 enum { block_samples = 1 << 14, block_paths = 1 << 13 };
 
 typedef struct irradiance_job {
+    const lx_pool *pool;
     const float *positions, *normals;
     lx_path_settings settings;
     uint32_t samples, seed;
@@ -35,6 +36,7 @@ static void trace_block(const irradiance_job *job, struct scratch *s, size_t poi
     const lx_receiver receiver = receiver_at(job, point);
     const uint32_t stream = lx_stream_key(job->seed, (uint32_t)(point >> 32) ^ 0x70696e74u, (uint32_t)point);
     for (uint32_t sample = first; sample < end;) {
+        if (lx_pool_is_stopping(job->pool)) return;
         size_t count = 0;
         for (; count < lx_path_batch_size && sample < end; ++sample)
             s->starts[count++] = (lx_path_start){.receiver = receiver, .weight = {1, 1, 1}, .stream = stream,
@@ -85,7 +87,7 @@ lx_result lx_irradiance(const lx_scene *scene, const lx_transport_desc *transpor
     lx_tracer *tracer = NULL;
     lx_source_use *uses = NULL;
     const uint32_t workers = lx_pool_worker_count(scene->context->pool);
-    irradiance_job job = {.positions = positions, .normals = normals, .samples = samples, .seed = transport->seed,
+    irradiance_job job = {.pool = scene->context->pool, .positions = positions, .normals = normals, .samples = samples, .seed = transport->seed,
                           .point_count = count};
     job.blocks_per_point = (samples + block_samples - 1) / block_samples;
     job.points_per_task = samples < block_paths ? block_paths / samples : 1;

@@ -7,6 +7,7 @@
 
 #include <errno.h>
 #include <pthread.h>
+#include <stdatomic.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -64,6 +65,7 @@ struct lx_pool {
     pthread_t *threads;
     uint32_t worker_count;
     bool quit;
+    atomic_bool stopping; // result is not LX_OK; readable without the mutex
 
     // The job that runs. Guarded by `mutex`.
     lx_task task;
@@ -106,6 +108,7 @@ static void *worker_main(void *argument)
             pool->result = result;
             pool->error = error;
             pool->failed_task = index;
+            atomic_store(&pool->stopping, true);
         }
         pthread_cond_signal(&pool->progress);
     }
@@ -162,6 +165,11 @@ void lx_pool_destroy(lx_pool *pool)
     lx_free(pool);
 }
 
+bool lx_pool_is_stopping(const lx_pool *pool)
+{
+    return atomic_load_explicit(&pool->stopping, memory_order_relaxed);
+}
+
 uint32_t lx_pool_worker_count(const lx_pool *pool)
 {
     return pool->worker_count;
@@ -190,6 +198,7 @@ lx_result lx_pool_run_weighted(lx_pool *pool, size_t task_count, const float *we
     pool->next_task = 0;
     pool->weight_done = 0;
     pool->result = go_on ? LX_OK : LX_ERROR_CANCELLED;
+    atomic_store(&pool->stopping, !go_on);
     pool->failed_task = 0;
     pool->task_count = task_count;
     pthread_cond_broadcast(&pool->work);
@@ -209,7 +218,10 @@ lx_result lx_pool_run_weighted(lx_pool *pool, size_t task_count, const float *we
         pthread_mutex_unlock(&pool->mutex);
         go_on = report(sink, stage, fraction < 1.0 ? fraction : 1.0, start);
         pthread_mutex_lock(&pool->mutex);
-        if (!go_on && pool->result == LX_OK) pool->result = LX_ERROR_CANCELLED;
+        if (!go_on && pool->result == LX_OK) {
+            pool->result = LX_ERROR_CANCELLED;
+            atomic_store(&pool->stopping, true);
+        }
     }
     const lx_result result = pool->result;
     if (error && result != LX_OK) {

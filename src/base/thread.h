@@ -31,6 +31,10 @@ lx_result lx_pool_run(lx_pool *pool, size_t task_count, lx_task task, void *user
 lx_result lx_pool_run_weighted(lx_pool *pool, size_t task_count, const float *weights, lx_task task, void *user,
                                const char *stage, const lx_progress_sink *sink, lx_error *error);
 
+/// True once a run is to end early, because it was cancelled or a task failed. Long tasks ask now and then and return; what they had is
+/// thrown away, so LX_OK will do.
+bool lx_pool_is_stopping(const lx_pool *pool);
+
 uint32_t lx_core_count(void);
 
 /// Sets flush-to-zero for the calling thread; Embree slows down several times on denormals.

@@ -193,7 +193,8 @@ static lx_result render_tile(void *user, size_t task, uint32_t worker, lx_error 
     const lx_render_desc *desc = job->desc;
     const uint32_t tile_x = (uint32_t)(task % job->tiles_across) * tile_edge, tile_y = (uint32_t)(task / job->tiles_across) * tile_edge;
     memset(s->sums, 0, sizeof s->sums);
-    for (uint32_t sample = 0; sample < desc->samples; ++sample) {
+    const lx_pool *pool = lx_tracer_scene(job->picture->tracer)->context->pool;
+    for (uint32_t sample = 0; sample < desc->samples && !lx_pool_is_stopping(pool); ++sample) {
         const size_t count = start_sights(job, s, tile_x, tile_y, sample);
         trace_sights(job, s, count, sample);
     }
