@@ -183,21 +183,29 @@ cleanup:
     return result;
 }
 
+// Texels per metre that the file's own atlas gives.
+static float scene_atlas_density(const lx_unwrap_job *job)
+{
+    double area = 0, uv_area = 0;
+    for (uint32_t m = 0; m < job->mesh_count; ++m) {
+        area += job->meshes[m].set.area;
+        uv_area += job->meshes[m].set.uv_area;
+    }
+    return (float)((double)job->desc.page_size * sqrt(uv_area / area));
+}
+
 static void keep_scene_atlas(lx_unwrap_job *job)
 {
     lx_atlas *atlas = job->atlas;
-    double area = 0, uv_area = 0;
     atlas->scene_atlas = true;
     atlas->page_count = 1;
     for (uint32_t m = 0; m < job->mesh_count; ++m) {
         lx_mesh_job *mesh = &job->meshes[m];
         mesh->existing = true;
-        area += mesh->set.area;
-        uv_area += mesh->set.uv_area;
         atlas->rects[job->instances[mesh->first_instance]] = (lx_atlas_rect){
             .used = true, .width = atlas->page_size, .height = atlas->page_size, .scale = {1, 1}, .offset = {0, 0}};
     }
-    atlas->texels_per_m = (float)((double)atlas->page_size * sqrt(uv_area / area));
+    atlas->texels_per_m = scene_atlas_density(job);
 }
 
 // A chart longer than a page would keep the density of the whole scene down. At the density that would use three quarters of
@@ -248,8 +256,10 @@ static lx_result build(lx_unwrap_job *job, lx_error *error)
     } else {
         LX_TRY(lx_unwrap_run(job, lx_unwrap_mesh, 0.5, error));
         result = lx_choose_density(job, error);
-        // Rather light that bleeds a little between charts than no light at all: the page is too small for anything better.
-        if (result == LX_ERROR_LIMIT && flaw) {
+        // Rather light that bleeds a little between charts than hardly a texel for each: the page is too small for anything better.
+        const bool too_small = result == LX_ERROR_LIMIT ||
+                               (result == LX_OK && job->atlas->texels_per_m < 0.5f * scene_atlas_density(job));
+        if (too_small && flaw && job->desc.texels_per_m == 0) {
             lx_log_warning(job->scene->context->log, "the file's TEXCOORD_1 atlas %s at %u texels, and nothing better fits; it is used as it is",
                            flaw, job->desc.page_size);
             keep_scene_atlas(job);
