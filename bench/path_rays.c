@@ -48,9 +48,8 @@ void __wrap_lx_accel_transmittance(const lx_accel *accel, const lx_ray *rays, lx
     __real_lx_accel_transmittance(accel, rays, transmittance, count);
 }
 
-static RTCScene bare_scene(RTCDevice device, const lx_tracer *tracer)
+static RTCScene bare_scene(RTCDevice device, const lx_scene *scene)
 {
-    const lx_scene *scene = lx_tracer_scene(tracer);
     RTCScene out = rtcNewScene(device);
     rtcSetSceneFlags(out, RTC_SCENE_FLAG_ROBUST);
     for (uint32_t s = 0; s < scene->surface_count; ++s) {
@@ -127,7 +126,6 @@ int main(int argc, char **argv)
     lx_context *context = NULL;
     lx_scene *scene = NULL;
     lx_atlas *atlas = NULL;
-    lx_tracer *tracer = NULL;
     lx_context_desc context_desc = lx_context_desc_default();
     context_desc.thread_count = 1;
     context_desc.logger.func = silent;
@@ -149,9 +147,8 @@ int main(int argc, char **argv)
     lx_bake_summary recorded;
     LX_TRY(bake_once(scene, atlas, &desc, &recorded, &error));
     is_recording = false;
-    LX_TRY(lx_tracer_create(scene, &desc.transport, false, &tracer, &error));
     RTCDevice device = rtcNewDevice("threads=1");
-    RTCScene bare = bare_scene(device, tracer);
+    RTCScene bare = bare_scene(device, scene);
     const double raw = replay(bare);
     const double rays = (double)(closest.count + shadow.count);
     printf("{\"rays\": %.0f, \"closest\": %zu, \"shadow\": %zu, \"integrator_s\": %.4f, \"embree_s\": %.4f, "
@@ -163,7 +160,6 @@ cleanup:
     if (result != LX_OK) fprintf(stderr, "path_rays: %s\n", error.message);
     free(closest.rays);
     free(shadow.rays);
-    lx_tracer_destroy(tracer);
     lx_atlas_destroy(atlas);
     lx_scene_destroy(scene);
     lx_context_destroy(context);

@@ -79,7 +79,8 @@ static bool triangle_on_page(const lx_atlas *atlas, uint32_t instance, uint32_t 
     return cross_of(out[0], out[1], out[2]) != 0;
 }
 
-uint32_t *lx_chart_bases(const lx_atlas *atlas)
+// First number of each instance's charts on the pages: [instance_count], owned by the caller.
+static uint32_t *chart_bases(const lx_atlas *atlas)
 {
     const lx_scene *scene = atlas->scene;
     uint32_t *bases = lx_calloc_array(scene->instance_count, sizeof *bases);
@@ -208,7 +209,7 @@ lx_result lx_luxels_rasterise(lx_bake *bake, uint32_t page, lx_luxel_page *out, 
     lx_result result = LX_OK;
     raw_fragments raw = {0};
     *out = (lx_luxel_page){0};
-    uint32_t *bases = lx_chart_bases(bake->atlas);
+    uint32_t *bases = chart_bases(bake->atlas);
     if (!bases) return lx_fail_memory(error, "luxels");
     LX_TRY(cover_page(bake, page, bases, &raw, error));
     if (raw.count > UINT32_MAX) {

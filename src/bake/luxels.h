@@ -21,9 +21,6 @@ typedef struct lx_luxel_page {
 lx_result lx_luxels_rasterise(lx_bake *bake, uint32_t page, lx_luxel_page *out, lx_error *error);
 void lx_luxels_release(lx_luxel_page *page);
 
-/// First number of an instance's charts in bake->texel_chart: [instance_count], owned by the caller.
-uint32_t *lx_chart_bases(const lx_atlas *atlas);
-
 /// `count` places spread over the covered part of a texel, by area: positions on the surface, lifted off it where smooth shading asks for it and
 /// pushed out of solid geometry. `stream` seeds the spread.
 void lx_luxel_sites(const lx_bake *bake, const lx_luxel_page *page, uint32_t x, uint32_t y, uint32_t stream, uint32_t count,

@@ -12,18 +12,6 @@ static inline lx_mat4 lx_mat4_identity(void)
     return (lx_mat4){{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}};
 }
 
-static inline lx_mat4 lx_mat4_mul(lx_mat4 a, lx_mat4 b)
-{
-    lx_mat4 r;
-    for (int c = 0; c < 4; ++c)
-        for (int i = 0; i < 4; ++i) {
-            float sum = 0;
-            for (int k = 0; k < 4; ++k) sum += a.m[k * 4 + i] * b.m[c * 4 + k];
-            r.m[c * 4 + i] = sum;
-        }
-    return r;
-}
-
 /// Translation · rotation (unit quaternion x y z w) · scale.
 static inline lx_mat4 lx_mat4_trs(lx_vec3 t, lx_vec4 q, lx_vec3 s)
 {

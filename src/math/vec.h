@@ -19,18 +19,12 @@ typedef struct lx_vec4 { float x, y, z, w; } lx_vec4;
 typedef struct lx_rgb { float r, g, b; } lx_rgb;
 
 static inline lx_vec2 lx_v2(float x, float y) { return (lx_vec2){x, y}; }
-static inline lx_vec2 lx_add2(lx_vec2 a, lx_vec2 b) { return (lx_vec2){a.x + b.x, a.y + b.y}; }
 static inline lx_vec2 lx_sub2(lx_vec2 a, lx_vec2 b) { return (lx_vec2){a.x - b.x, a.y - b.y}; }
-static inline lx_vec2 lx_scale2(lx_vec2 a, float s) { return (lx_vec2){a.x * s, a.y * s}; }
 static inline float lx_dot2(lx_vec2 a, lx_vec2 b) { return a.x * b.x + a.y * b.y; }
-/// z of the cross product: twice the signed area of the triangle (0, a, b), positive when counter-clockwise.
-static inline float lx_cross2(lx_vec2 a, lx_vec2 b) { return a.x * b.y - a.y * b.x; }
-static inline float lx_length2(lx_vec2 a) { return sqrtf(lx_dot2(a, a)); }
 
 static inline lx_vec3 lx_v3(float x, float y, float z) { return (lx_vec3){x, y, z}; }
 static inline lx_vec3 lx_add(lx_vec3 a, lx_vec3 b) { return (lx_vec3){a.x + b.x, a.y + b.y, a.z + b.z}; }
 static inline lx_vec3 lx_sub(lx_vec3 a, lx_vec3 b) { return (lx_vec3){a.x - b.x, a.y - b.y, a.z - b.z}; }
-static inline lx_vec3 lx_mul(lx_vec3 a, lx_vec3 b) { return (lx_vec3){a.x * b.x, a.y * b.y, a.z * b.z}; }
 static inline lx_vec3 lx_scale(lx_vec3 a, float s) { return (lx_vec3){a.x * s, a.y * s, a.z * s}; }
 /// a + b·s
 static inline lx_vec3 lx_mad(lx_vec3 a, lx_vec3 b, float s) { return (lx_vec3){a.x + b.x * s, a.y + b.y * s, a.z + b.z * s}; }
@@ -42,7 +36,6 @@ static inline lx_vec3 lx_cross(lx_vec3 a, lx_vec3 b)
 }
 static inline float lx_length(lx_vec3 a) { return sqrtf(lx_dot(a, a)); }
 static inline float lx_distance(lx_vec3 a, lx_vec3 b) { return lx_length(lx_sub(a, b)); }
-static inline lx_vec3 lx_lerp(lx_vec3 a, lx_vec3 b, float t) { return lx_mad(lx_scale(a, 1 - t), b, t); }
 static inline lx_vec3 lx_min3(lx_vec3 a, lx_vec3 b) { return (lx_vec3){lx_min(a.x, b.x), lx_min(a.y, b.y), lx_min(a.z, b.z)}; }
 static inline lx_vec3 lx_max3(lx_vec3 a, lx_vec3 b) { return (lx_vec3){lx_max(a.x, b.x), lx_max(a.y, b.y), lx_max(a.z, b.z)}; }
 static inline float lx_max_abs(lx_vec3 a) { return lx_max(fabsf(a.x), lx_max(fabsf(a.y), fabsf(a.z))); }

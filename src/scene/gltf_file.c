@@ -171,16 +171,6 @@ static lx_result note_ignored(const lx_gltf_reader *reader, lx_error *error)
     return LX_OK;
 }
 
-bool lx_gltf_uses_extension(const lx_gltf_reader *reader, const char *name)
-{
-    const json_t *used = json_object_get(reader->root.json, "extensionsUsed");
-    for (size_t i = 0; i < json_array_size(used); ++i) {
-        const char *entry = json_string_value(json_array_get(used, i));
-        if (entry && strcmp(entry, name) == 0) return true;
-    }
-    return false;
-}
-
 static void recognise_exporter(lx_gltf_reader *reader)
 {
     const char *generator =

@@ -112,8 +112,6 @@ lx_result lx_gltf_name(lx_gltf_reader *reader, const lx_gltf_object *element, co
 
 // gltf_file.c: container, JSON, version, extensions.
 lx_result lx_gltf_open(lx_gltf_reader *reader, const void *data, size_t size, lx_error *error);
-/// True if the file's extensionsUsed names it.
-bool lx_gltf_uses_extension(const lx_gltf_reader *reader, const char *name);
 /// What to do about Draco, as the end of a sentence.
 const char *lx_gltf_draco_advice(void);
 
