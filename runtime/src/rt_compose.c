@@ -30,13 +30,20 @@ static uint32_t least(uint32_t a, uint32_t b)
     return a < b ? a : b;
 }
 
-lxrt_result lxrt_compose(const lxrt_pack *pack, uint32_t page, uint32_t level, uint32_t x, uint32_t y, uint32_t width, uint32_t height,
-                         float *out_rgb, size_t row_stride)
+size_t lxrt_format_bytes(lxrt_format format)
 {
+    return format == LXRT_FORMAT_RGB32F ? 12 : format == LXRT_FORMAT_RGBA16F ? 8 : 4;
+}
+
+lxrt_result lxrt_compose(const lxrt_pack *pack, const lxrt_region *region, const lxrt_target *target)
+{
+    const uint32_t page = region->page, level = region->level, x = region->x, y = region->y, width = region->width, height = region->height;
     if (page >= pack->page_count || level >= pack->level_count) return LXRT_ERROR_INVALID_ARGUMENT;
     const uint32_t size = lxrt_level_size(pack, level);
     if (x > size || width > size - x || y > size || height > size - y) return LXRT_ERROR_INVALID_ARGUMENT;
-    if (row_stride == 0) row_stride = 3 * (size_t)width;
+    if (target->format != LXRT_FORMAT_RGB32F || target->scale != 1) return LXRT_ERROR_INVALID_ARGUMENT;
+    float *const out_rgb = target->texels;
+    const size_t row_stride = target->row_bytes ? target->row_bytes / sizeof(float) : 3 * (size_t)width;
     if (row_stride < 3 * (size_t)width) return LXRT_ERROR_INVALID_ARGUMENT;
     if (width == 0 || height == 0) return LXRT_OK;
     if (!out_rgb) return LXRT_ERROR_INVALID_ARGUMENT;
@@ -84,15 +91,17 @@ static void split_coordinate(float coordinate, uint32_t size, uint32_t *first, u
     }
 }
 
-lxrt_result lxrt_lightmap_sample(const lxrt_pack *pack, uint32_t page, float u, float v, float out_rgb[3])
+lxrt_result lxrt_lightmap_sample(const lxrt_pack *pack, uint32_t page, float u, float v, lxrt_filter filter, float out_rgb[3])
 {
+    (void)filter;
     if (page >= pack->page_count) return LXRT_ERROR_INVALID_ARGUMENT;
     uint32_t x[2], y[2];
     float weight_x, weight_y, texels[4][3];
     split_coordinate(u, pack->page_size, &x[0], &x[1], &weight_x);
     split_coordinate(v, pack->page_size, &y[0], &y[1], &weight_y);
     for (int i = 0; i < 4; ++i) {
-        const lxrt_result result = lxrt_compose(pack, page, 0, x[i & 1], y[i >> 1], 1, 1, texels[i], 0);
+        const lxrt_result result = lxrt_compose(pack, &(lxrt_region){page, 0, x[i & 1], y[i >> 1], 1, 1},
+                                                &(lxrt_target){texels[i], 0, LXRT_FORMAT_RGB32F, 1});
         if (result != LXRT_OK) return result;
     }
     for (int k = 0; k < 3; ++k) {

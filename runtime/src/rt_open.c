@@ -317,14 +317,20 @@ uint32_t lxrt_find_layer(const lxrt_pack *pack, const char *name)
     return LXRT_NONE;
 }
 
-lxrt_result lxrt_set_layer(lxrt_pack *pack, uint32_t layer, const float rgb[3])
+lxrt_result lxrt_set_layer(lxrt_pack *pack, uint32_t layer, const float rgb[3], float intensity)
 {
     lxrt_color color;
     if (layer >= pack->layer_count) return LXRT_ERROR_NOT_FOUND;
-    memcpy(color.color, rgb, sizeof color.color);
-    if (!color_factors(rgb, lxrt_load_f32(lxrt_element(&pack->layers, layer) + 24), color.factor)) return LXRT_ERROR_INVALID_ARGUMENT;
+    for (int i = 0; i < 3; ++i) color.color[i] = rgb[i] * intensity;
+    if (!color_factors(color.color, lxrt_load_f32(lxrt_element(&pack->layers, layer) + 24), color.factor))
+        return LXRT_ERROR_INVALID_ARGUMENT;
     pack->colors[layer] = color;
     return LXRT_OK;
+}
+
+lxrt_result lxrt_set_layer_named(lxrt_pack *pack, const char *name, const float rgb[3], float intensity)
+{
+    return lxrt_set_layer(pack, lxrt_find_layer(pack, name), rgb, intensity);
 }
 
 lxrt_result lxrt_get_layer(const lxrt_pack *pack, uint32_t layer, float out_rgb[3])

@@ -307,7 +307,7 @@ void lx_baked_get_layer(const lx_baked *baked, uint32_t layer, float out_rgb[3])
 
 void lx_baked_set_layer(lx_baked *baked, uint32_t layer, const float rgb[3])
 {
-    lxrt_set_layer(baked->pack, layer, rgb); // refuses what it cannot sum; the layer keeps its colour then
+    lxrt_set_layer(baked->pack, layer, rgb, 1); // refuses what it cannot sum; the layer keeps its colour then
 }
 
 lx_rgb lx_baked_source_strength(const lx_baked *baked, uint32_t index)
@@ -325,7 +325,9 @@ lx_result lx_baked_compose(const lx_baked *baked, uint32_t page, float *out_rgb,
     if (page >= baked->manifest.page_count)
         return lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "%s: there is no page %u; it has %u", baked->folder, page,
                        baked->manifest.page_count);
-    const lxrt_result rt = lxrt_compose(baked->pack, page, 0, 0, 0, size, size, out_rgb, 0);
+    const lxrt_region region = {.page = page, .width = size, .height = size};
+    const lxrt_target target = {.texels = out_rgb, .format = LXRT_FORMAT_RGB32F, .scale = 1};
+    const lxrt_result rt = lxrt_compose(baked->pack, &region, &target);
     return rt == LXRT_OK ? LX_OK : lx_fail(error, LX_ERROR_BACKEND, "%s: page %u: %s", baked->folder, page, lxrt_result_name(rt));
 }
 

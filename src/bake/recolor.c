@@ -133,8 +133,7 @@ static bool parse_value(const char *text, float color[3], bool *has_intensity, f
 
 static lx_result set_one(lx_baked *baked, uint32_t layer, const float color[3], float intensity, lx_error *error)
 {
-    const float c[3] = {color[0] * intensity, color[1] * intensity, color[2] * intensity};
-    const lxrt_result rt = lxrt_set_layer(baked->pack, layer, c);
+    const lxrt_result rt = lxrt_set_layer(baked->pack, layer, color, intensity);
     return rt == LXRT_OK ? LX_OK
                          : lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "layer '%s': that is far too bright",
                                    lx_baked_layer_name(baked, layer));

@@ -39,13 +39,13 @@ static void use_texels(lxrt_pack *pack, const lxrt_info *info)
             const uint32_t size = info->page_size >> level, width = size < 70 ? size : 70;
             float *rgb = malloc(3 * sizeof *rgb * width * width);
             require(rgb != NULL);
-            require(lxrt_compose(pack, page, level, 0, 0, width, width, rgb, 0) == LXRT_OK);
+            require(lxrt_compose(pack, &(lxrt_region){page, level, 0, 0, width, width}, &(lxrt_target){rgb, 0, LXRT_FORMAT_RGB32F, 1}) == LXRT_OK);
             require(lxrt_compose(pack, page, level, size - width, size - width, width, width, rgb, 0) == LXRT_OK);
             for (uint32_t i = 0; i < 3 * width * width; ++i) require(isfinite(rgb[i]));
             free(rgb);
         }
         float rgb[3];
-        require(lxrt_lightmap_sample(pack, page, 0.99f, 0.01f, rgb) == LXRT_OK && isfinite(rgb[0]));
+        require(lxrt_lightmap_sample(pack, page, 0.99f, 0.01f, LXRT_FILTER_BILINEAR, rgb) == LXRT_OK && isfinite(rgb[0]));
     }
 }
 
@@ -61,7 +61,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     use_tables(pack, &info);
     use_texels(pack, &info);
     if (info.layer_count > 0) {
-        lxrt_set_layer(pack, info.layer_count - 1, (const float[3]){1e27f, -1e27f, 0});
+        lxrt_set_layer(pack, info.layer_count - 1, (const float[3]){1e27f, -1e27f, 0}, 1);
         use_texels(pack, &info);
     }
     free(memory);

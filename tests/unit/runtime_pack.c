@@ -5,7 +5,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 
-#include "luxel_rt.h"
+#include "runtime_fixture.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -121,18 +121,18 @@ static void hand_made_pack_is_read_as_documented(void **state)
     assert_int_equal(lxrt_find_layer(pack, "b"), 1);
 
     float rgb[3];
-    assert_int_equal(lxrt_compose(pack, 0, 0, 32, 0, 1, 1, rgb, 0), LXRT_OK);
+    assert_int_equal(compose(pack, 0, 0, 32, 0, 1, 1, rgb, 0), LXRT_OK);
     assert_float_equal(rgb[0], 256 * 2 * 4, 0); // mantissa × 2^(24 - 24) × intensity × scale
     assert_float_equal(rgb[1], 128 * 2 * 4, 0);
     assert_float_equal(rgb[2], 511 * 2 * 4, 0);
-    assert_int_equal(lxrt_compose(pack, 0, 0, 39, 2, 1, 1, rgb, 0), LXRT_OK);
+    assert_int_equal(compose(pack, 0, 0, 39, 2, 1, 1, rgb, 0), LXRT_OK);
     assert_float_equal(rgb[0], 0x1p-24f * 8, 0);
-    assert_int_equal(lxrt_compose(pack, 0, 0, 31, 0, 1, 1, rgb, 0), LXRT_OK);
+    assert_int_equal(compose(pack, 0, 0, 31, 0, 1, 1, rgb, 0), LXRT_OK);
     assert_float_equal(rgb[0], 0, 0);
-    assert_int_equal(lxrt_compose(pack, 0, 1, 19, 19, 1, 1, rgb, 0), LXRT_OK);
+    assert_int_equal(compose(pack, 0, 1, 19, 19, 1, 1, rgb, 0), LXRT_OK);
     assert_float_equal(rgb[2], 65408, 0);
-    assert_int_equal(lxrt_set_layer(pack, 1, (const float[3]){0, 0.5f, 0}), LXRT_OK);
-    assert_int_equal(lxrt_compose(pack, 0, 1, 19, 19, 1, 1, rgb, 0), LXRT_OK);
+    assert_int_equal(lxrt_set_layer(pack, 1, (const float[3]){0, 0.5f, 0}, 1), LXRT_OK);
+    assert_int_equal(compose(pack, 0, 1, 19, 19, 1, 1, rgb, 0), LXRT_OK);
     assert_float_equal(rgb[1], 32704, 0);
     assert_float_equal(rgb[2], 0, 0);
 
@@ -140,9 +140,9 @@ static void hand_made_pack_is_read_as_documented(void **state)
     assert_int_equal(lxrt_find_rect(pack, 6, -1, &rect), LXRT_OK);
     assert_int_equal(lxrt_find_rect(pack, 7, -1, &rect), LXRT_ERROR_NOT_FOUND);
     // Texel centres of (32, 0) lie at (32.5 / 40, 0.5 / 40); half a texel further left the absent block begins.
-    assert_int_equal(lxrt_lightmap_sample(pack, 0, 32.5f / 40, 0.5f / 40, rgb), LXRT_OK);
+    assert_int_equal(lxrt_lightmap_sample(pack, 0, 32.5f / 40, 0.5f / 40, LXRT_FILTER_BILINEAR, rgb), LXRT_OK);
     assert_float_equal(rgb[0], 2048, 0.01);
-    assert_int_equal(lxrt_lightmap_sample(pack, 0, 32.25f / 40, 0.75f / 40, rgb), LXRT_OK);
+    assert_int_equal(lxrt_lightmap_sample(pack, 0, 32.25f / 40, 0.75f / 40, LXRT_FILTER_BILINEAR, rgb), LXRT_OK);
     assert_float_equal(rgb[0], 2048 * 0.75 * 0.75, 0.01);
 }
 
@@ -236,9 +236,9 @@ static void arguments_that_make_no_sense_are_refused(void **state)
     assert_int_equal(lxrt_open(pack_bytes, sizeof pack_bytes, memory, needed - 1, &pack), LXRT_ERROR_MEMORY_TOO_SMALL);
     assert_null(pack);
     assert_int_equal(lxrt_open(pack_bytes, sizeof pack_bytes, memory, needed, &pack), LXRT_OK);
-    assert_int_equal(lxrt_compose(pack, 0, 0, 0, 0, 0, 40, NULL, 0), LXRT_OK); // nothing to do
-    assert_int_equal(lxrt_compose(pack, 0, 0, 0, 0, 1, 1, NULL, 0), LXRT_ERROR_INVALID_ARGUMENT);
-    assert_int_equal(lxrt_compose(pack, 0, 0, 41, 0, 0, 0, NULL, 0), LXRT_ERROR_INVALID_ARGUMENT);
+    assert_int_equal(compose(pack, 0, 0, 0, 0, 0, 40, NULL, 0), LXRT_OK); // nothing to do
+    assert_int_equal(compose(pack, 0, 0, 0, 0, 1, 1, NULL, 0), LXRT_ERROR_INVALID_ARGUMENT);
+    assert_int_equal(compose(pack, 0, 0, 41, 0, 0, 0, NULL, 0), LXRT_ERROR_INVALID_ARGUMENT);
 }
 
 int main(void)

@@ -6,7 +6,7 @@
 #include <cmocka.h>
 
 #include "base/memory.h"
-#include "luxel_rt.h"
+#include "runtime_fixture.h"
 #include "math/hash.h"
 #include "store/pack.h"
 
@@ -177,13 +177,13 @@ static void pack_round_trip_stays_within_rgb9e5_error(void **state)
     for (uint32_t only = 0; only < layer_count; ++only) {
         for (uint32_t layer = 0; layer < layer_count; ++layer) {
             const float white = layer == only;
-            assert_int_equal(lxrt_set_layer(pack, layer, (const float[3]){white, white, white}), LXRT_OK);
+            assert_int_equal(lxrt_set_layer(pack, layer, (const float[3]){white, white, white}, 1), LXRT_OK);
         }
         for (uint32_t page = 0; page < page_count; ++page) {
             for (uint32_t level = 0; level < level_count; ++level) {
                 static float rgb[3 * page_size * page_size];
                 const uint32_t size = page_size >> level;
-                assert_int_equal(lxrt_compose(pack, page, level, 0, 0, size, size, rgb, 0), LXRT_OK);
+                assert_int_equal(compose(pack, page, level, 0, 0, size, size, rgb, 0), LXRT_OK);
                 for (uint32_t i = 0; i < 3 * size * size; i += 3) {
                     const float *want = &texels[page][only][level][i];
                     const float largest = fmaxf(want[0], fmaxf(want[1], want[2]));
@@ -210,11 +210,11 @@ static void compose_equals_the_sum_of_layers_in_any_rectangle(void **state)
     const float colors[layer_count][3] = {{1e6f, 2e6f, 3e5f}, {0.5f, 0, 8}, {1e-6f, 1e-5f, 0}};
     for (uint32_t layer = 0; layer < layer_count; ++layer) {
         for (uint32_t other = 0; other < layer_count; ++other)
-            lxrt_set_layer(pack, other, other == layer ? colors[layer] : (const float[3]){0, 0, 0});
-        assert_int_equal(lxrt_compose(pack, 1, 0, 0, 0, page_size, page_size, parts[layer], 0), LXRT_OK);
+            lxrt_set_layer(pack, other, other == layer ? colors[layer] : (const float[3]){0, 0, 0}, 1);
+        assert_int_equal(compose(pack, 1, 0, 0, 0, page_size, page_size, parts[layer], 0), LXRT_OK);
     }
-    for (uint32_t layer = 0; layer < layer_count; ++layer) lxrt_set_layer(pack, layer, colors[layer]);
-    assert_int_equal(lxrt_compose(pack, 1, 0, 0, 0, page_size, page_size, whole, 0), LXRT_OK);
+    for (uint32_t layer = 0; layer < layer_count; ++layer) lxrt_set_layer(pack, layer, colors[layer], 1);
+    assert_int_equal(compose(pack, 1, 0, 0, 0, page_size, page_size, whole, 0), LXRT_OK);
     for (int i = 0; i < 3 * page_size * page_size; ++i) {
         float sum = 0;
         for (int layer = 0; layer < layer_count; ++layer) sum += parts[layer][i];
@@ -227,17 +227,17 @@ static void compose_equals_the_sum_of_layers_in_any_rectangle(void **state)
         const size_t stride = 3 * (size_t)width + 5;
         if (stride * height > sizeof rectangle / sizeof *rectangle) continue;
         for (size_t i = 0; i < sizeof rectangle / sizeof *rectangle; ++i) rectangle[i] = -1;
-        assert_int_equal(lxrt_compose(pack, 1, 0, x, y, width, height, rectangle, stride), LXRT_OK);
+        assert_int_equal(compose(pack, 1, 0, x, y, width, height, rectangle, stride), LXRT_OK);
         for (uint32_t row = 0; row < height; ++row) {
             assert_memory_equal(rectangle + row * stride, whole + 3 * ((y + row) * page_size + x), 3 * width * sizeof(float));
             assert_float_equal(rectangle[row * stride + 3 * width], -1, 0);
         }
     }
-    assert_int_equal(lxrt_compose(pack, 1, 0, 1, 0, page_size, 1, whole, 0), LXRT_ERROR_INVALID_ARGUMENT);
-    assert_int_equal(lxrt_compose(pack, 1, 0, 2, 2, UINT32_MAX, 1, whole, 0), LXRT_ERROR_INVALID_ARGUMENT);
-    assert_int_equal(lxrt_compose(pack, 2, 0, 0, 0, 1, 1, whole, 0), LXRT_ERROR_INVALID_ARGUMENT);
-    assert_int_equal(lxrt_compose(pack, 1, 3, 0, 0, 1, 1, whole, 0), LXRT_ERROR_INVALID_ARGUMENT);
-    assert_int_equal(lxrt_compose(pack, 1, 0, 0, 0, 2, 2, whole, 5), LXRT_ERROR_INVALID_ARGUMENT);
+    assert_int_equal(compose(pack, 1, 0, 1, 0, page_size, 1, whole, 0), LXRT_ERROR_INVALID_ARGUMENT);
+    assert_int_equal(compose(pack, 1, 0, 2, 2, UINT32_MAX, 1, whole, 0), LXRT_ERROR_INVALID_ARGUMENT);
+    assert_int_equal(compose(pack, 2, 0, 0, 0, 1, 1, whole, 0), LXRT_ERROR_INVALID_ARGUMENT);
+    assert_int_equal(compose(pack, 1, 3, 0, 0, 1, 1, whole, 0), LXRT_ERROR_INVALID_ARGUMENT);
+    assert_int_equal(compose(pack, 1, 0, 0, 0, 2, 2, whole, 5), LXRT_ERROR_INVALID_ARGUMENT);
     free(memory);
     lx_bytes_release(&bytes);
 }
@@ -251,11 +251,11 @@ static void lightmap_sample_is_bilinear_and_clamped(void **state)
     fill_texels();
     write_pack(&bytes, NULL);
     lxrt_pack *pack = open_pack(&bytes, &memory);
-    assert_int_equal(lxrt_compose(pack, 0, 0, 0, 0, page_size, page_size, whole, 0), LXRT_OK);
+    assert_int_equal(compose(pack, 0, 0, 0, 0, page_size, page_size, whole, 0), LXRT_OK);
     float rgb[3];
     for (int round = 0; round < 500; ++round) {
         const float u = random_float() * 1.2f - 0.1f, v = random_float() * 1.2f - 0.1f;
-        assert_int_equal(lxrt_lightmap_sample(pack, 0, u, v, rgb), LXRT_OK);
+        assert_int_equal(lxrt_lightmap_sample(pack, 0, u, v, LXRT_FILTER_BILINEAR, rgb), LXRT_OK);
         const double fx = fmin(fmax((double)u * page_size - 0.5, 0), page_size - 1);
         const double fy = fmin(fmax((double)v * page_size - 0.5, 0), page_size - 1);
         const int x = (int)fx, y = (int)fy, x1 = x + 1 < page_size ? x + 1 : x, y1 = y + 1 < page_size ? y + 1 : y;
@@ -266,8 +266,8 @@ static void lightmap_sample_is_bilinear_and_clamped(void **state)
             assert_true(fabs(rgb[k] - want) <= 1e-4 * (a + b + c + d));
         }
     }
-    assert_int_equal(lxrt_lightmap_sample(pack, 0, NAN, INFINITY, rgb), LXRT_OK);
-    assert_int_equal(lxrt_lightmap_sample(pack, page_count, 0, 0, rgb), LXRT_ERROR_INVALID_ARGUMENT);
+    assert_int_equal(lxrt_lightmap_sample(pack, 0, NAN, INFINITY, LXRT_FILTER_BILINEAR, rgb), LXRT_OK);
+    assert_int_equal(lxrt_lightmap_sample(pack, page_count, 0, 0, LXRT_FILTER_BILINEAR, rgb), LXRT_ERROR_INVALID_ARGUMENT);
     free(memory);
     lx_bytes_release(&bytes);
 }
@@ -281,11 +281,11 @@ static void set_layer_refuses_numbers_that_cannot_be_summed(void **state)
     write_pack(&bytes, NULL);
     lxrt_pack *pack = open_pack(&bytes, &memory);
     float rgb[3];
-    assert_int_equal(lxrt_set_layer(pack, 0, (const float[3]){1, 2, 3}), LXRT_OK);
-    assert_int_equal(lxrt_set_layer(pack, 0, (const float[3]){NAN, 0, 0}), LXRT_ERROR_INVALID_ARGUMENT);
-    assert_int_equal(lxrt_set_layer(pack, 0, (const float[3]){0, INFINITY, 0}), LXRT_ERROR_INVALID_ARGUMENT);
-    assert_int_equal(lxrt_set_layer(pack, 0, (const float[3]){0, 0, -3e38f}), LXRT_ERROR_INVALID_ARGUMENT);
-    assert_int_equal(lxrt_set_layer(pack, layer_count, (const float[3]){0, 0, 0}), LXRT_ERROR_NOT_FOUND);
+    assert_int_equal(lxrt_set_layer(pack, 0, (const float[3]){1, 2, 3}, 1), LXRT_OK);
+    assert_int_equal(lxrt_set_layer(pack, 0, (const float[3]){NAN, 0, 0}, 1), LXRT_ERROR_INVALID_ARGUMENT);
+    assert_int_equal(lxrt_set_layer(pack, 0, (const float[3]){0, INFINITY, 0}, 1), LXRT_ERROR_INVALID_ARGUMENT);
+    assert_int_equal(lxrt_set_layer(pack, 0, (const float[3]){0, 0, -3e38f}, 1), LXRT_ERROR_INVALID_ARGUMENT);
+    assert_int_equal(lxrt_set_layer(pack, layer_count, (const float[3]){0, 0, 0}, 1), LXRT_ERROR_NOT_FOUND);
     assert_int_equal(lxrt_get_layer(pack, 0, rgb), LXRT_OK);
     assert_float_equal(rgb[1], 2, 0);
     free(memory);
@@ -317,7 +317,7 @@ static void pack_leaves_out_blocks_below_the_threshold(void **state)
     assert_int_equal(stats.block_count, 1);
     assert_int_equal(stats.absent_count, 15);
     lxrt_pack *pack = open_pack(&bytes, &memory);
-    assert_int_equal(lxrt_compose(pack, 0, 0, 0, 0, 128, 128, back, 0), LXRT_OK);
+    assert_int_equal(compose(pack, 0, 0, 0, 0, 128, 128, back, 0), LXRT_OK);
     for (int y = 0; y < 128; ++y) {
         for (int x = 0; x < 128; ++x) {
             const bool there = x / 32 == 2 && y / 32 == 1;
@@ -396,13 +396,13 @@ static void use_everything(lxrt_pack *pack)
         for (uint32_t level = 0; level < info.level_count; ++level) {
             const uint32_t size = info.page_size >> level;
             float *rgb = malloc(3 * (size_t)size * sizeof *rgb);
-            assert_int_equal(lxrt_compose(pack, page, level, 0, size - 1, size, 1, rgb, 0), LXRT_OK);
-            assert_int_equal(lxrt_compose(pack, page, level, size / 2, 0, 1, size, rgb, 0), LXRT_OK);
+            assert_int_equal(compose(pack, page, level, 0, size - 1, size, 1, rgb, 0), LXRT_OK);
+            assert_int_equal(compose(pack, page, level, size / 2, 0, 1, size, rgb, 0), LXRT_OK);
             for (uint32_t i = 0; i < size; ++i) assert_true(isfinite(rgb[3 * i]) && isfinite(rgb[3 * i + 1]));
             free(rgb);
         }
         float rgb[3];
-        assert_int_equal(lxrt_lightmap_sample(pack, page, 0.4f, 0.9f, rgb), LXRT_OK);
+        assert_int_equal(lxrt_lightmap_sample(pack, page, 0.4f, 0.9f, LXRT_FILTER_BILINEAR, rgb), LXRT_OK);
     }
 }
 
