@@ -234,6 +234,7 @@ static lxrt_result read_pack(const void *data, size_t size, lxrt_pack *pack)
                               sections[i].table);
         if (result != LXRT_OK) return result;
     }
+    pack->file_bytes = in.size;
     pack->block_index = index.data;
     pack->blocks = blocks.data;
     pack->block_count = blocks.count;
@@ -271,6 +272,8 @@ lxrt_result lxrt_open(const void *data, size_t size, void *memory, size_t memory
     unsigned char *aligned = (unsigned char *)memory + (misaligned ? memory_alignment - misaligned : 0);
     lxrt_pack *pack = (lxrt_pack *)(void *)aligned;
     *pack = local;
+    pack->handle_bytes = memory_needed(&local);
+    pack->kernel = lxrt_best_kernel();
     pack->colors = (lxrt_color *)(void *)(aligned + sizeof *pack);
     for (uint32_t i = 0; i < pack->layer_count; ++i) read_authored_color(lxrt_element(&pack->layers, i), &pack->colors[i]);
     *out_pack = pack;

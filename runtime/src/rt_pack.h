@@ -3,6 +3,7 @@
 #define LXRT_RT_PACK_H
 
 #include "luxel_rt.h"
+#include "rt_kernel.h"
 
 #include <string.h>
 
@@ -32,6 +33,9 @@ struct lxrt_pack {
     uint32_t block_count;
     uint32_t level_first[lxrt_max_levels + 1]; // of a layer's page: where each level's entries begin; the last is their number
     lxrt_color *colors;                        // [layer_count]
+    uint64_t file_bytes;
+    size_t handle_bytes;
+    lxrt_kernel kernel; // of the composer
 };
 
 // Little-endian numbers at any address. Compilers turn these into plain loads.
