@@ -16,6 +16,9 @@ typedef struct lx_layer {
     float color[3];      ///< c = color × intensity at authored strength.
     float intensity;
     uint32_t source_count;
+    const lx_source *monitor; ///< Whose cell it is, the first of its monitors; NULL: none. Borrowed from the scene.
+    uint32_t cell;            ///< Number of the cell.
+    lx_rgb white;             ///< Monitors: c of a white pixel = white × intensity.
 } lx_layer;
 
 struct lx_bake {

@@ -78,6 +78,26 @@ static const char *kind_name(const lx_bake *bake, lx_source_kind kind)
     return bake->desc.combined ? "combined" : names[kind];
 }
 
+// Every monitor, also those that share their layers with others.
+static void list_monitors(const lx_bake *bake, lx_manifest *manifest)
+{
+    for (uint32_t i = 0; i < bake->source_count; ++i) {
+        const lx_source *source = lx_tracer_source(bake->tracer, i);
+        const int32_t first = bake->uses[i].layer;
+        if (first < 0 || !bake->layers[first].monitor) continue;
+        const lx_layer *layer = &bake->layers[first];
+        manifest->monitors[manifest->monitor_count++] = (lx_manifest_monitor){
+            .name = source->name,
+            .node = source->node,
+            .material = bake->scene->materials[source->material].file_index,
+            .columns = source->columns,
+            .rows = source->rows,
+            .first_layer = (uint32_t)first,
+            .strength = {layer->white.r * layer->intensity, layer->white.g * layer->intensity, layer->white.b * layer->intensity},
+        };
+    }
+}
+
 static lx_result describe(const lx_bake *bake, lx_manifest *manifest, lx_error *error)
 {
     const lx_atlas *atlas = bake->atlas;
@@ -92,6 +112,7 @@ static lx_result describe(const lx_bake *bake, lx_manifest *manifest, lx_error *
         .layers = lx_calloc_array(bake->layer_count, sizeof *manifest->layers),
         .page_count = atlas->page_count,
         .layer_count = bake->layer_count,
+        .monitors = lx_calloc_array(bake->source_count, sizeof *manifest->monitors),
         .bake = {
             .samples = bake->desc.samples,
             .bounces = bake->desc.direct_only ? 0 : bake->desc.transport.bounces,
@@ -102,7 +123,7 @@ static lx_result describe(const lx_bake *bake, lx_manifest *manifest, lx_error *
             .threads = bake->scene->context ? lx_pool_worker_count(bake->scene->context->pool) : 0,
         },
     };
-    if (!manifest->pages || !manifest->layers) return lx_fail_memory(error, "luxel.json");
+    if (!manifest->pages || !manifest->layers || !manifest->monitors) return lx_fail_memory(error, "luxel.json");
     for (uint32_t page = 0; page < atlas->page_count; ++page) {
         size_t covered = 0;
         for (size_t i = 0; i < texel_count; ++i) covered += bake->texel_coverage[page * texel_count + i] != 0;
@@ -121,6 +142,7 @@ static lx_result describe(const lx_bake *bake, lx_manifest *manifest, lx_error *
             .scale = 1,
         };
     }
+    list_monitors(bake, manifest);
     return LX_OK;
 }
 

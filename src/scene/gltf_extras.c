@@ -190,6 +190,23 @@ static lx_result read_color(const key_site *site, const json_t *value, lx_error 
     return LX_OK;
 }
 
+// "16x9": columns, then rows.
+static lx_result read_monitor(const key_site *site, const json_t *value, lx_error *error)
+{
+    (void)error;
+    const char *text = json_string_value(value);
+    uint32_t columns, rows;
+    char extra;
+    if (text && sscanf(text, " %4u%*1[xX]%4u %c", &columns, &rows, &extra) == 2 && columns >= 1 && rows >= 1 &&
+        columns <= lx_most_monitor_cells && rows <= lx_most_monitor_cells && columns * rows <= lx_most_monitor_cells) {
+        site->out->monitor_columns = columns;
+        site->out->monitor_rows = rows;
+    } else {
+        warn(site, "'COLUMNSxROWS' (16x9, say) with 4096 cells at most");
+    }
+    return LX_OK;
+}
+
 enum { node = LX_EXTRAS_NODE, light = LX_EXTRAS_LIGHT, material = LX_EXTRAS_MATERIAL };
 
 static const struct {
@@ -208,7 +225,7 @@ static const struct {
     {"luxel_area", node | light, read_area},
     {"luxel_color", node | light, read_color},
     {"luxel_intensity", node | light, read_intensity},
-    {"luxel_monitor", node | material, NULL},
+    {"luxel_monitor", node | material, read_monitor},
     {"luxel_probes", node, NULL},
     {"luxel_lightmap", node, NULL}, // what our own export writes
     {"luxel_baked", node | light | material, NULL},
@@ -301,6 +318,10 @@ lx_gltf_extras lx_gltf_extras_merge(lx_gltf_extras first, const lx_gltf_extras *
     if (!first.has_intensity) {
         first.has_intensity = second->has_intensity;
         first.intensity = second->intensity;
+    }
+    if (first.monitor_columns == 0) {
+        first.monitor_columns = second->monitor_columns;
+        first.monitor_rows = second->monitor_rows;
     }
     return first;
 }

@@ -166,6 +166,8 @@ static lx_result read_authoring(lx_gltf_reader *reader, const lx_gltf_object *ob
     out->mode = extras.mode >= 0 ? (lx_light_mode)extras.mode : LX_MODE_BAKED;
     out->layer = extras.layer;
     out->density = extras.density > 0 ? extras.density : 1;
+    out->monitor_columns = extras.monitor_columns;
+    out->monitor_rows = extras.monitor_rows;
     return LX_OK;
 }
 

@@ -54,6 +54,8 @@ typedef struct lx_gltf_node {
     bool holds_no_lamps;     ///< In a VPLS… or BLOCKERS… group.
     int32_t area_owner;      ///< The nearest node upwards (or itself) with luxel_area; -1: none.
     bool area_taken;         ///< A lamp below uses this node's luxel_area.
+    int32_t monitor_owner;   ///< The nearest node upwards (or itself) with luxel_monitor; -1: none.
+    bool monitor_taken;      ///< A screen at or below this node uses its luxel_monitor.
     lx_gltf_extras extras;   ///< Its own keys, then completed by those of the nodes above.
 } lx_gltf_node;
 

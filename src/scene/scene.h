@@ -14,6 +14,7 @@
 
 struct json_t; // jansson's; the document is kept and edited, so that nothing of the input is lost on export
 
+enum { lx_most_monitor_cells = 4096 }; ///< Of one `luxel_monitor`: each is a layer.
 enum { lx_texcoord_sets = 4 }; ///< TEXCOORD_0 … 3 are read; a material that asks for a later set gets a warning and set 0.
 
 typedef enum lx_wrap { LX_WRAP_REPEAT, LX_WRAP_CLAMP, LX_WRAP_MIRROR } lx_wrap;
@@ -61,6 +62,7 @@ typedef struct lx_material {
     lx_light_mode mode;    ///< `luxel_mode` on the material (of its emission).
     const char *layer;     ///< `luxel_layer` on the material; NULL: none.
     float density;         ///< `luxel_density` on the material; 1: none. Multiplies the node's.
+    uint32_t monitor_columns, monitor_rows; ///< `luxel_monitor` on the material; 0: none.
 } lx_material;
 
 /// One glTF primitive as indexed triangles (strips and fans converted, points and lines dropped). Local space.
@@ -137,7 +139,12 @@ typedef struct lx_source {
     int32_t material;  ///< Emissive: index into materials; else -1.
     lx_rgb color;      ///< Authored; emissive: emissive_factor.
     float intensity;   ///< In the unit of its kind; emissive: emissive_strength (nit).
+    uint32_t columns, rows; ///< A monitor (`luxel_monitor`): its grid of cells over TEXCOORD_0. 0: none.
+    lx_rgb white;      ///< Monitor: radiance of a white pixel = white × intensity. `color`, but white where that is black.
+    const lx_rgb *picture; ///< Monitor: [columns × rows] mean linear texel of the emissive texture in each cell, row by row; white without one.
 } lx_source;
+
+static inline uint32_t lx_source_cell_count(const lx_source *source) { return source->columns * source->rows; }
 
 typedef struct lx_camera {
     const char *name; ///< Of the node, else of the camera, else "camera_K".
@@ -184,7 +191,19 @@ lx_vec4 lx_texture_sample(const lx_scene *scene, const lx_texture_slot *slot, lx
 /// True if a texel of the image has alpha below 1, i.e. the slot can let light through.
 bool lx_texture_has_alpha(const lx_scene *scene, const lx_texture_slot *slot);
 
+/// The monitor that the surface belongs to; NULL: none.
+const lx_source *lx_surface_monitor(const lx_scene *scene, uint32_t surface);
+
 /// True if the material emits: factor and strength above zero, and not unlit, which ignores emission. (Its texture may still be black.)
 bool lx_material_emits(const lx_material *material);
+
+/// The cell of a monitor that TEXCOORD_0 = `uv` lies in: (0, 0) is in cell 0, what lies outside belongs to the nearest one.
+static inline uint32_t lx_monitor_cell(const lx_source *monitor, lx_vec2 uv)
+{
+    // lx_max takes NaN, which overflow may leave, for its second argument.
+    const float x = lx_min(lx_max(uv.x * (float)monitor->columns, 0), (float)(monitor->columns - 1));
+    const float y = lx_min(lx_max(uv.y * (float)monitor->rows, 0), (float)(monitor->rows - 1));
+    return (uint32_t)y * monitor->columns + (uint32_t)x;
+}
 
 #endif
