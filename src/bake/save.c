@@ -212,6 +212,7 @@ typedef struct pack_tables {
     lx_pack_layer *layers;
     lx_pack_source *sources;
     lx_pack_rect *rects;
+    lx_pack_monitor *monitors;
     float *coverage;
     uint32_t source_count, rect_count;
 } pack_tables;
@@ -221,6 +222,7 @@ static void pack_tables_release(pack_tables *tables)
     lx_free(tables->layers);
     lx_free(tables->sources);
     lx_free(tables->rects);
+    lx_free(tables->monitors);
     lx_free(tables->coverage);
 }
 
@@ -270,10 +272,11 @@ static lx_result begin_pack(const lx_bake *bake, const lx_manifest *manifest, co
         .layers = lx_calloc_array(bake->layer_count, sizeof *tables.layers),
         .sources = lx_calloc_array(bake->source_count, sizeof *tables.sources),
         .rects = lx_calloc_array(bake->scene->instance_count, sizeof *tables.rects),
+        .monitors = lx_calloc_array(manifest->monitor_count, sizeof *tables.monitors),
         .coverage = lx_calloc_array(manifest->page_count, sizeof *tables.coverage),
     };
     lx_result result = LX_OK;
-    if (!tables.layers || !tables.sources || !tables.rects || !tables.coverage) {
+    if (!tables.layers || !tables.sources || !tables.rects || !tables.monitors || !tables.coverage) {
         result = lx_fail_memory(error, "luxel.pack");
         goto cleanup;
     }
@@ -290,6 +293,12 @@ static lx_result begin_pack(const lx_bake *bake, const lx_manifest *manifest, co
         };
     }
     for (uint32_t i = 0; i < manifest->page_count; ++i) tables.coverage[i] = manifest->pages[i].coverage;
+    for (uint32_t i = 0; i < manifest->monitor_count; ++i) {
+        const lx_manifest_monitor *m = &manifest->monitors[i];
+        tables.monitors[i] = (lx_pack_monitor){.name = m->name, .node = m->node, .material = m->material, .columns = m->columns,
+                                               .rows = m->rows, .first_layer = m->first_layer,
+                                               .strength = {m->strength[0], m->strength[1], m->strength[2]}};
+    }
     list_sources(bake, &tables);
     list_rects(bake, &tables);
     const lx_pack_desc desc = {
@@ -303,6 +312,8 @@ static lx_result begin_pack(const lx_bake *bake, const lx_manifest *manifest, co
         .source_count = tables.source_count,
         .rects = tables.rects,
         .rect_count = tables.rect_count,
+        .monitors = tables.monitors,
+        .monitor_count = manifest->monitor_count,
     };
     LX_TRY(lx_pack_begin(&desc, out, error));
 cleanup:
