@@ -3,6 +3,7 @@
 #include "bake/bake.h"
 
 #include "bake/advice.h"
+#include "bake/animations.h"
 #include "bake/layers.h"
 #include "bake/luxels.h"
 #include "base/clock.h"
@@ -69,6 +70,7 @@ lx_result lx_bake_create(const lx_scene *scene, const lx_atlas *atlas, const lx_
     bake->desc = *desc;
     LX_TRY(create_tracer(bake, error));
     LX_TRY(lx_layers_build(bake, error));
+    LX_TRY(lx_animations_build(bake, error));
     size_t texel_count, value_count;
     if (!lx_mul_size((size_t)atlas->page_size * atlas->page_size, atlas->page_count, &texel_count) ||
         !lx_mul_size(texel_count * 3, bake->layer_count, &value_count)) {
@@ -94,6 +96,7 @@ cleanup:
 void lx_bake_destroy(lx_bake *bake)
 {
     if (!bake) return;
+    lx_animations_release(bake);
     lx_layers_release(bake);
     lx_tracer_destroy(bake->tracer);
     lx_free(bake->texels);

@@ -32,6 +32,8 @@ struct lx_bake {
     lx_source_use *uses;   ///< [source_count] per source of the tracer: its layer and its share of it (weight).
     uint32_t source_count;
 
+    struct lx_bake_animations *animations; ///< What drives the layers (bake/animations.h); NULL: nothing.
+
     /// T of every layer: image (page * layer_count + layer), page_size² × RGB floats, row 0 first. Unit light: lux per cd, lx or nt
     /// (for `combined`: lux). After lx_bake_run padding is filled by dilation.
     float *texels;

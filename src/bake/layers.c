@@ -154,7 +154,7 @@ static void weigh_members(lx_bake *bake, uint32_t layer_index)
     lx_layer *layer = &bake->layers[layer_index];
     lx_rgb color = {0, 0, 0};
     bool first = true, equal = true;
-    float strongest = 0, largest = 0;
+    float strongest = 0, largest = 0, widest = 0;
     for (uint32_t i = 0; i < bake->source_count; ++i) {
         if (bake->uses[i].layer != (int32_t)layer_index) continue;
         const lx_source *s = lx_tracer_source(bake->tracer, i);
@@ -162,6 +162,7 @@ static void weigh_members(lx_bake *bake, uint32_t layer_index)
         equal &= same_color(color, full_color(s));
         first = false;
         strongest = fmaxf(strongest, s->intensity);
+        widest = fmaxf(widest, s->intensity_scale);
         largest = fmaxf(largest, s->intensity * lx_rgb_max(full_color(s)));
     }
     const lx_rgb shown = equal ? color : lx_rgb_grey(1);
@@ -174,6 +175,8 @@ static void weigh_members(lx_bake *bake, uint32_t layer_index)
         const lx_source *s = lx_tracer_source(bake->tracer, i);
         lx_rgb weight = {1, 1, 1};
         if (equal && strongest > 0) weight = lx_rgb_grey(s->intensity / strongest);
+        // All are off: as they would be if one animation turned them up together.
+        if (equal && !(strongest > 0) && widest > 0) weight = lx_rgb_grey(s->intensity_scale / widest);
         if (!equal && largest > 0) weight = lx_rgb_scale(full_color(s), s->intensity / largest);
         bake->uses[i].weight = weight;
     }

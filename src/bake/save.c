@@ -2,6 +2,7 @@
 // asked for.
 #include "bake/save.h"
 
+#include "bake/animations.h"
 #include "base/clock.h"
 #include "base/error.h"
 #include "scene/gltf_export.h"
@@ -98,6 +99,28 @@ static void list_monitors(const lx_bake *bake, lx_manifest *manifest)
     }
 }
 
+static void list_animations(const lx_bake *bake, lx_manifest *manifest)
+{
+    static const char *const channels[] = {"light", "color", "intensity"};
+    for (size_t i = 0; bake->animations && i < bake->animations->count; ++i) {
+        const lx_pack_animation *item = &bake->animations->items[i];
+        const lxrt_program *program = &item->program;
+        float duration_s = program->kind == LXRT_PROGRAM_CONSTANT ? 0 : program->period_s;
+        if (program->kind == LXRT_PROGRAM_KEYS) { // the time of the last key
+            const size_t width = item->channel == LX_PACK_CHANNEL_INTENSITY ? 1 : 3;
+            const size_t stride = 1 + width * (program->interpolation == LXRT_CUBIC ? 3 : 1);
+            duration_s = program->keys[stride * (program->key_count - 1)];
+        }
+        manifest->animations[manifest->animation_count++] = (lx_manifest_animation){
+            .name = item->name,
+            .layer = item->layer,
+            .program = lx_program_name((lx_program_kind)program->kind),
+            .channel = channels[item->channel],
+            .duration_s = duration_s,
+        };
+    }
+}
+
 static lx_result describe(const lx_bake *bake, lx_manifest *manifest, lx_error *error)
 {
     const lx_atlas *atlas = bake->atlas;
@@ -113,6 +136,7 @@ static lx_result describe(const lx_bake *bake, lx_manifest *manifest, lx_error *
         .page_count = atlas->page_count,
         .layer_count = bake->layer_count,
         .monitors = lx_calloc_array(bake->source_count, sizeof *manifest->monitors),
+        .animations = lx_calloc_array(bake->animations ? bake->animations->count : 0, sizeof *manifest->animations),
         .bake = {
             .samples = bake->desc.samples,
             .bounces = bake->desc.direct_only ? 0 : bake->desc.transport.bounces,
@@ -123,7 +147,7 @@ static lx_result describe(const lx_bake *bake, lx_manifest *manifest, lx_error *
             .threads = bake->scene->context ? lx_pool_worker_count(bake->scene->context->pool) : 0,
         },
     };
-    if (!manifest->pages || !manifest->layers || !manifest->monitors) return lx_fail_memory(error, "luxel.json");
+    if (!manifest->pages || !manifest->layers || !manifest->monitors || !manifest->animations) return lx_fail_memory(error, "luxel.json");
     for (uint32_t page = 0; page < atlas->page_count; ++page) {
         size_t covered = 0;
         for (size_t i = 0; i < texel_count; ++i) covered += bake->texel_coverage[page * texel_count + i] != 0;
@@ -143,6 +167,7 @@ static lx_result describe(const lx_bake *bake, lx_manifest *manifest, lx_error *
         };
     }
     list_monitors(bake, manifest);
+    list_animations(bake, manifest);
     return LX_OK;
 }
 
@@ -314,6 +339,8 @@ static lx_result begin_pack(const lx_bake *bake, const lx_manifest *manifest, co
         .rect_count = tables.rect_count,
         .monitors = tables.monitors,
         .monitor_count = manifest->monitor_count,
+        .animations = bake->animations ? bake->animations->items : NULL,
+        .animation_count = bake->animations ? (uint32_t)bake->animations->count : 0,
     };
     LX_TRY(lx_pack_begin(&desc, out, error));
 cleanup:

@@ -207,6 +207,28 @@ static lx_result read_monitor(const key_site *site, const json_t *value, lx_erro
     return LX_OK;
 }
 
+static lx_result read_animate(const key_site *site, const json_t *value, lx_error *error)
+{
+    const char *text = json_string_value(value);
+    lx_error reason;
+    lx_program program;
+    if (!text) {
+        warn(site, "a program ('flicker 0.2 low=0.5', say)");
+        return LX_OK;
+    }
+    const lx_result result = lx_program_parse(text, site->strings, &program, &reason);
+    if (result == LX_ERROR_OUT_OF_MEMORY) return lx_fail_memory(error, "programs");
+    if (result != LX_OK) {
+        lx_log_warning(site->log, "%s: %s: %s; ignored", site->object->label, site->key, reason.message);
+        return LX_OK;
+    }
+    lx_program *kept = lx_arena_alloc(site->strings, 1, sizeof *kept);
+    if (!kept) return lx_fail_memory(error, "programs");
+    *kept = program;
+    site->out->animate = kept;
+    return LX_OK;
+}
+
 enum { node = LX_EXTRAS_NODE, light = LX_EXTRAS_LIGHT, material = LX_EXTRAS_MATERIAL };
 
 static const struct {
@@ -226,6 +248,7 @@ static const struct {
     {"luxel_color", node | light, read_color},
     {"luxel_intensity", node | light, read_intensity},
     {"luxel_monitor", node | material, read_monitor},
+    {"luxel_animate", node | light | material, read_animate},
     {"luxel_probes", node, NULL},
     {"luxel_lightmap", node, NULL}, // what our own export writes
     {"luxel_baked", node | light | material, NULL},
@@ -319,6 +342,7 @@ lx_gltf_extras lx_gltf_extras_merge(lx_gltf_extras first, const lx_gltf_extras *
         first.has_intensity = second->has_intensity;
         first.intensity = second->intensity;
     }
+    if (!first.animate) first.animate = second->animate;
     if (first.monitor_columns == 0) {
         first.monitor_columns = second->monitor_columns;
         first.monitor_rows = second->monitor_rows;

@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { max_pages = 65536, max_layers = 1 << 20, max_files = 1 << 22 };
+enum { max_pages = 65536, max_layers = 1 << 20, max_files = 1 << 22, max_animations = 1 << 20 };
 
 void lx_manifest_release(lx_manifest *manifest)
 {
@@ -18,6 +18,7 @@ void lx_manifest_release(lx_manifest *manifest)
     lx_free(manifest->layers);
     lx_free(manifest->files);
     lx_free(manifest->monitors);
+    lx_free(manifest->animations);
     lx_arena_release(&manifest->strings);
     *manifest = (lx_manifest){0};
 }
@@ -125,6 +126,18 @@ static json_t *write_monitor(const lx_manifest *manifest, uint32_t index)
     return NULL;
 }
 
+static json_t *write_animation(const lx_manifest *manifest, uint32_t index)
+{
+    const lx_manifest_animation *animation = &manifest->animations[index];
+    json_t *object = json_object();
+    if (put(object, "name", text(animation->name)) && put(object, "layer", json_integer(animation->layer)) &&
+        put(object, "program", text(animation->program)) && put(object, "channel", text(animation->channel)) &&
+        put(object, "duration", real((double)animation->duration_s)))
+        return object;
+    json_decref(object);
+    return NULL;
+}
+
 static json_t *write_array(const lx_manifest *manifest, uint32_t count, json_t *(*write)(const lx_manifest *, uint32_t))
 {
     json_t *array = json_array();
@@ -219,6 +232,7 @@ lx_result lx_manifest_write(const lx_manifest *manifest, const uint64_t *sizes, 
         put(root, "atlas", write_atlas(manifest)) && put(root, "layers", write_array(manifest, manifest->layer_count, write_layer)) &&
         put(root, "files", write_array(manifest, manifest->file_count, write_file)) &&
         put(root, "monitors", write_array(manifest, manifest->monitor_count, write_monitor)) &&
+        put(root, "animations", write_array(manifest, manifest->animation_count, write_animation)) &&
         (!manifest->has_sky || put(root, "sky", write_sky(&manifest->sky))) &&
         (!manifest->has_view || put(root, "view", write_view(manifest))) && put(root, "bake", write_bake(&manifest->bake)) &&
         put(root, "hashes", write_hashes(manifest)) && (!sizes || put(root, "sizes", write_sizes(manifest, sizes)));
@@ -428,6 +442,31 @@ cleanup:
     return result;
 }
 
+static lx_result read_animations(const reader *r, const json_t *root)
+{
+    lx_result result = LX_OK;
+    lx_manifest *m = r->manifest;
+    const json_t *items = NULL;
+    LX_TRY(get_array(r, root, "", "animations", false, max_animations, sizeof *m->animations, &items, &m->animations, &m->animation_count));
+    for (uint32_t i = 0; i < m->animation_count; ++i) {
+        const json_t *item = json_array_get(items, i);
+        lx_manifest_animation *animation = &m->animations[i];
+        char where[place_bytes];
+        name_element(where, "animations", i);
+        LX_TRY(get_text(r, item, where, "name", "", &animation->name));
+        LX_TRY(get_uint(r, item, where, "layer", true, &animation->layer));
+        LX_TRY(get_text(r, item, where, "program", NULL, &animation->program));
+        LX_TRY(get_text(r, item, where, "channel", "light", &animation->channel));
+        LX_TRY(get_float(r, item, where, "duration", false, &animation->duration_s));
+        if (animation->layer >= m->layer_count) {
+            result = wrong(r, where, "layer", "there is no such layer");
+            goto cleanup;
+        }
+    }
+cleanup:
+    return result;
+}
+
 static lx_result read_sky(const reader *r, const json_t *root)
 {
     lx_result result = LX_OK;
@@ -510,6 +549,7 @@ lx_result lx_manifest_read(const char *text_data, size_t size, lx_manifest *out,
     LX_TRY(read_layers(&r, root));
     LX_TRY(read_files(&r, root));
     LX_TRY(read_monitors(&r, root));
+    LX_TRY(read_animations(&r, root));
     LX_TRY(read_sky(&r, root));
     LX_TRY(read_view(&r, root));
     LX_TRY(read_bake(&r, root));

@@ -44,6 +44,14 @@ typedef struct lx_manifest_monitor {
     float strength[3];      ///< c of a white pixel, nit.
 } lx_manifest_monitor;
 
+typedef struct lx_manifest_animation {
+    const char *name;    ///< Of the file's animation; "": `luxel_animate`.
+    uint32_t layer;
+    const char *program; ///< "keys", "blink", "flicker", "pulse", "wheel", "schedule", "constant".
+    const char *channel; ///< "light": colour × intensity. "color", "intensity".
+    float duration_s;    ///< Of keys; the period of others.
+} lx_manifest_animation;
+
 typedef struct lx_manifest_bake {
     uint32_t samples, bounces; ///< LX_BOUNCES_INF is written as "inf".
     const char *integrator;
@@ -64,7 +72,8 @@ typedef struct lx_manifest {
     lx_manifest_layer *layers;
     lx_manifest_file *files;
     lx_manifest_monitor *monitors;
-    uint32_t page_count, layer_count, file_count, monitor_count;
+    lx_manifest_animation *animations;
+    uint32_t page_count, layer_count, file_count, monitor_count, animation_count;
     bool has_sky, has_view;
     lx_manifest_sky sky;
     float view_ev;

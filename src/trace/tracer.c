@@ -292,7 +292,8 @@ static lx_result build_sources(lx_tracer *tracer, const lx_sky_desc *sky, const 
     const lx_scene *scene = tracer->scene;
     const lx_result result = lx_sky_load(sky, &tracer->sky, error);
     if (result != LX_OK) return result;
-    tracer->sky_source = (lx_source){.kind = LX_SOURCE_SKY, .name = "sky", .mode = LX_MODE_BAKED, .light = -1, .parent_node = -1,
+    tracer->sky_source = (lx_source){.kind = LX_SOURCE_SKY, .name = "sky", .mode = LX_MODE_BAKED, .light = -1, .file_light = -1,
+                                     .parent_node = -1, .color_scale = 1, .intensity_scale = 1,
                                      .material = -1, .color = {sky->color[0], sky->color[1], sky->color[2]},
                                      .intensity = sky->intensity};
     const bool untinted = sky->color[0] == 0 && sky->color[1] == 0 && sky->color[2] == 0;
