@@ -334,11 +334,9 @@ lx_result lx_baked_compose(const lx_baked *baked, uint32_t page, float *out_rgb,
 static uint64_t file_bytes(const lx_baked *baked, const char *name)
 {
     char *path = name ? lx_path_join(baked->folder, name) : NULL;
-    FILE *file = path ? fopen(path, "rb") : NULL;
-    const long size = file && fseek(file, 0, SEEK_END) == 0 ? ftell(file) : -1;
-    if (file) fclose(file);
+    const uint64_t bytes = path ? lx_file_bytes(path) : 0;
     lx_free(path);
-    return size > 0 ? (uint64_t)size : 0;
+    return bytes;
 }
 
 lx_result lx_baked_describe(const lx_baked *baked, char **out_json, lx_error *error)

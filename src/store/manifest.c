@@ -218,6 +218,24 @@ lx_result lx_manifest_write(const lx_manifest *manifest, const uint64_t *sizes, 
     return result;
 }
 
+lx_result lx_manifest_drop_files(const char *text_data, size_t size, char **out_text, lx_error *error)
+{
+    json_error_t problem;
+    json_t *root = json_loadb(text_data, size, JSON_REJECT_DUPLICATES, &problem);
+    if (!root) return lx_fail(error, LX_ERROR_FORMAT, "line %d: %s", problem.line, problem.text);
+    json_t *layer;
+    size_t index;
+    json_object_set_new(root, "files", json_array());
+    json_array_foreach(json_object_get(root, "layers"), index, layer) json_object_del(layer, "scale"); // of KTX2 files alone
+    char *dump = json_dumps(root, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
+    char *copy = dump ? lx_format("%s\n", dump) : NULL;
+    free(dump);
+    json_decref(root);
+    if (!copy) return lx_fail_memory(error, "luxel.json");
+    *out_text = copy;
+    return LX_OK;
+}
+
 // ---- reading: every getter names what is wrong, relative to `where`
 
 typedef struct reader {

@@ -75,6 +75,10 @@ bool lx_path_stays_inside(const char *path);
 /// named in the manifest, in the order scene, pack, files; 0 leaves one out.
 lx_result lx_manifest_write(const lx_manifest *manifest, const uint64_t *sizes, char **out_text, lx_error *error);
 
+/// The same text without what it says of lightmap files, for a copy of the folder that leaves them out. What it holds besides stays, known or not.
+/// Owned by the caller (lx_free).
+lx_result lx_manifest_drop_files(const char *text, size_t size, char **out_text, lx_error *error);
+
 /// Reads what lx_manifest_write writes; unknown fields are ignored. Hostile text gives an error that names the field.
 lx_result lx_manifest_read(const char *text, size_t size, lx_manifest *out, lx_error *error);
 
