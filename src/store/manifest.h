@@ -4,6 +4,7 @@
 
 #include "base/file.h"
 #include "base/memory.h"
+#include "luxel/bake.h"
 
 enum { lx_manifest_version = 1 };
 
@@ -41,6 +42,7 @@ typedef struct lx_manifest_bake {
     uint32_t seed;
     const char *isa;
     double seconds;
+    lx_stage_seconds stages;
     uint32_t threads;
 } lx_manifest_bake;
 
@@ -58,6 +60,7 @@ typedef struct lx_manifest {
     bool has_sky, has_view;
     lx_manifest_sky sky;
     float view_ev;
+    lx_budget memory; ///< All 0: not known, and not written. Not read: the pack says it.
     lx_manifest_bake bake;
     uint64_t scene_hash, pack_hash; ///< lx_content_hash; 0: not known.
     lx_arena strings;
