@@ -3,6 +3,7 @@
 #include "bake/bake.h"
 
 #include "bake/advice.h"
+#include "bake/animations.h"
 #include "bake/layers.h"
 #include "bake/luxels.h"
 #include "base/clock.h"
@@ -45,6 +46,18 @@ static lx_result check_desc(const lx_bake_desc *desc, lx_error *error)
     return LX_OK;
 }
 
+// Monitors are told by cell, unless all light goes into one layer: then their pictures need no cells.
+static lx_result create_tracer(lx_bake *bake, lx_error *error)
+{
+    const lx_scene *scene = bake->scene;
+    bool *cells = lx_calloc_array(scene->source_count, sizeof *cells);
+    if (!cells) return lx_fail_memory(error, "bake");
+    for (uint32_t i = 0; i < scene->source_count; ++i) cells[i] = scene->sources[i].columns > 0 && !bake->desc.combined;
+    const lx_result result = lx_tracer_create(scene, &bake->desc.transport, false, cells, &bake->tracer, error);
+    lx_free(cells);
+    return result;
+}
+
 lx_result lx_bake_create(const lx_scene *scene, const lx_atlas *atlas, const lx_bake_desc *desc, lx_bake **out_bake,
                          lx_error *error)
 {
@@ -55,8 +68,9 @@ lx_result lx_bake_create(const lx_scene *scene, const lx_atlas *atlas, const lx_
     bake->scene = scene;
     bake->atlas = atlas;
     bake->desc = *desc;
-    LX_TRY(lx_tracer_create(scene, &desc->transport, false, &bake->tracer, error));
+    LX_TRY(create_tracer(bake, error));
     LX_TRY(lx_layers_build(bake, error));
+    LX_TRY(lx_animations_build(bake, error));
     size_t texel_count, value_count;
     if (!lx_mul_size((size_t)atlas->page_size * atlas->page_size, atlas->page_count, &texel_count) ||
         !lx_mul_size(texel_count * 3, bake->layer_count, &value_count)) {
@@ -82,6 +96,7 @@ cleanup:
 void lx_bake_destroy(lx_bake *bake)
 {
     if (!bake) return;
+    lx_animations_release(bake);
     lx_layers_release(bake);
     lx_tracer_destroy(bake->tracer);
     lx_free(bake->texels);

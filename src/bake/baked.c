@@ -174,7 +174,7 @@ static lx_source_use find_use(const lx_baked *baked, const char *name, bool is_s
     lxrt_source source;
     for (uint32_t i = 0; lxrt_get_source(baked->pack, i, &source) == LXRT_OK; ++i)
         if ((source.kind == LXRT_KIND_SKY) == is_sky && strcmp(source.name, name) == 0)
-            return (lx_source_use){(int32_t)source.layer, {source.weight[0], source.weight[1], source.weight[2]}, true};
+            return (lx_source_use){.layer = (int32_t)source.layer, .weight = {source.weight[0], source.weight[1], source.weight[2]}, .direct = true};
     return (lx_source_use){.layer = -1};
 }
 
@@ -314,9 +314,38 @@ lx_rgb lx_baked_source_strength(const lx_baked *baked, uint32_t index)
 {
     const lx_source_use *use = &baked->uses[index];
     if (use->layer < 0) return (lx_rgb){0, 0, 0};
+    const lx_manifest_monitor *monitor = lx_baked_monitor(baked, index);
     float c[3];
     lx_baked_get_layer(baked, (uint32_t)use->layer, c);
+    if (monitor) {
+        const bool off = lx_rgb_is_black(baked->scene->sources[index].color);
+        for (int i = 0; i < 3; ++i) c[i] = off ? 0 : monitor->strength[i];
+    }
     return (lx_rgb){use->weight.r * c[0], use->weight.g * c[1], use->weight.b * c[2]};
+}
+
+const lx_manifest_monitor *lx_baked_monitor(const lx_baked *baked, uint32_t index)
+{
+    const lx_scene *scene = baked->scene;
+    if (index >= scene->source_count || scene->sources[index].columns == 0) return NULL;
+    for (uint32_t i = 0; i < baked->manifest.monitor_count; ++i) {
+        const lx_manifest_monitor *monitor = &baked->manifest.monitors[i];
+        const lx_source *source = &scene->sources[index];
+        if (strcmp(monitor->name, source->name) == 0 && monitor->columns == source->columns && monitor->rows == source->rows) return monitor;
+    }
+    return NULL;
+}
+
+bool lx_baked_monitor_shows_cells(const lx_baked *baked, const lx_manifest_monitor *monitor)
+{
+    for (uint32_t cell = 0; cell < monitor->columns * monitor->rows; ++cell) {
+        const lx_manifest_layer *layer = &baked->manifest.layers[monitor->first_layer + cell];
+        float c[3];
+        lx_baked_get_layer(baked, monitor->first_layer + cell, c);
+        for (int i = 0; i < 3; ++i)
+            if (c[i] != layer->color[i] * layer->intensity) return true;
+    }
+    return false;
 }
 
 lx_result lx_baked_compose(const lx_baked *baked, uint32_t page, float *out_rgb, lx_error *error)

@@ -90,7 +90,12 @@ static lx_rgb shown_emission(const lx_picture *picture, const lx_hit *hit, const
     const lx_surface *surface = &scene->surfaces[hit->surface];
     const lx_material *m = &scene->materials[surface->material];
     if (m->unlit) return s->emission;
-    if (surface->source >= 0) return lx_rgb_mul(s->emission, picture->uses[surface->source].weight);
+    if (surface->source >= 0) {
+        const lx_source_use *use = &picture->uses[surface->source];
+        const lx_rgb strength = use->cells ? lx_rgb_mul(use->weight, use->cells[lx_tracer_cell_at(picture->tracer, hit->surface, hit->triangle, hit->u, hit->v)])
+                                           : use->weight;
+        return lx_rgb_mul(s->emission, strength);
+    }
     return lx_rgb_mul(s->emission, lx_rgb_scale(m->emissive_factor, m->emissive_strength));
 }
 

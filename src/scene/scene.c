@@ -50,6 +50,7 @@ void lx_scene_destroy(lx_scene *scene)
     lx_free(scene->lights);
     lx_free(scene->sources);
     lx_free(scene->cameras);
+    lx_free(scene->tracks);
     lx_free(scene->buffers);
     lx_free(scene->image_files);
     lx_gltf_document_release(scene->document);
@@ -60,7 +61,14 @@ void lx_scene_destroy(lx_scene *scene)
 
 bool lx_material_emits(const lx_material *material)
 {
-    return !material->unlit && material->emissive_strength > 0 && lx_rgb_max(material->emissive_factor) > 0;
+    if (material->unlit) return false;
+    return material->emission_animated || (material->emissive_strength > 0 && lx_rgb_max(material->emissive_factor) > 0);
+}
+
+const lx_source *lx_surface_monitor(const lx_scene *scene, uint32_t surface)
+{
+    const int32_t source = scene->surfaces[surface].source;
+    return source >= 0 && scene->sources[source].columns > 0 ? &scene->sources[source] : NULL;
 }
 
 void lx_text_free(char *text) { lx_free(text); }

@@ -10,13 +10,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { max_pages = 65536, max_layers = 1 << 20, max_files = 1 << 22 };
+enum { max_pages = 65536, max_layers = 1 << 20, max_files = 1 << 22, max_animations = 1 << 20 };
 
 void lx_manifest_release(lx_manifest *manifest)
 {
     lx_free(manifest->pages);
     lx_free(manifest->layers);
     lx_free(manifest->files);
+    lx_free(manifest->monitors);
+    lx_free(manifest->animations);
     lx_arena_release(&manifest->strings);
     *manifest = (lx_manifest){0};
 }
@@ -106,6 +108,31 @@ static json_t *write_file(const lx_manifest *manifest, uint32_t index)
     json_t *object = json_object();
     if (put(object, "page", json_integer(file->page)) && put(object, "layer", json_integer(file->layer)) &&
         put(object, "format", text(file->format)) && put(object, "file", text(file->file)))
+        return object;
+    json_decref(object);
+    return NULL;
+}
+
+static json_t *write_monitor(const lx_manifest *manifest, uint32_t index)
+{
+    const lx_manifest_monitor *monitor = &manifest->monitors[index];
+    json_t *object = json_object();
+    if (put(object, "name", text(monitor->name)) && put(object, "node", json_integer(monitor->node)) &&
+        (monitor->material < 0 || put(object, "material", json_integer(monitor->material))) &&
+        put(object, "columns", json_integer(monitor->columns)) && put(object, "rows", json_integer(monitor->rows)) &&
+        put(object, "firstLayer", json_integer(monitor->first_layer)) && put(object, "strength", triple(monitor->strength)))
+        return object;
+    json_decref(object);
+    return NULL;
+}
+
+static json_t *write_animation(const lx_manifest *manifest, uint32_t index)
+{
+    const lx_manifest_animation *animation = &manifest->animations[index];
+    json_t *object = json_object();
+    if (put(object, "name", text(animation->name)) && put(object, "layer", json_integer(animation->layer)) &&
+        put(object, "program", text(animation->program)) && put(object, "channel", text(animation->channel)) &&
+        put(object, "duration", real((double)animation->duration_s)))
         return object;
     json_decref(object);
     return NULL;
@@ -244,6 +271,8 @@ lx_result lx_manifest_write(const lx_manifest *manifest, const uint64_t *sizes, 
         (!manifest->scene || put(root, "scene", text(manifest->scene))) && put(root, "pack", text(manifest->pack)) &&
         put(root, "atlas", write_atlas(manifest)) && put(root, "layers", write_array(manifest, manifest->layer_count, write_layer)) &&
         put(root, "files", write_array(manifest, manifest->file_count, write_file)) &&
+        put(root, "monitors", write_array(manifest, manifest->monitor_count, write_monitor)) &&
+        put(root, "animations", write_array(manifest, manifest->animation_count, write_animation)) &&
         (!manifest->has_sky || put(root, "sky", write_sky(&manifest->sky))) &&
         (!manifest->has_view || put(root, "view", write_view(manifest))) &&
         (!manifest->memory.ram || put(root, "memory", write_memory(&manifest->memory))) && put(root, "bake", write_bake(&manifest->bake)) &&
@@ -442,6 +471,61 @@ cleanup:
     return result;
 }
 
+static lx_result read_monitors(const reader *r, const json_t *root)
+{
+    lx_result result = LX_OK;
+    lx_manifest *m = r->manifest;
+    const json_t *items = NULL;
+    LX_TRY(get_array(r, root, "", "monitors", false, max_layers, sizeof *m->monitors, &items, &m->monitors, &m->monitor_count));
+    for (uint32_t i = 0; i < m->monitor_count; ++i) {
+        const json_t *item = json_array_get(items, i);
+        lx_manifest_monitor *monitor = &m->monitors[i];
+        char where[place_bytes];
+        uint32_t material = UINT32_MAX;
+        name_element(where, "monitors", i);
+        LX_TRY(get_text(r, item, where, "name", NULL, &monitor->name));
+        LX_TRY(get_uint(r, item, where, "node", true, &monitor->node));
+        LX_TRY(get_uint(r, item, where, "material", false, &material));
+        LX_TRY(get_uint(r, item, where, "columns", true, &monitor->columns));
+        LX_TRY(get_uint(r, item, where, "rows", true, &monitor->rows));
+        LX_TRY(get_uint(r, item, where, "firstLayer", true, &monitor->first_layer));
+        LX_TRY(get_color(r, item, where, "strength", monitor->strength));
+        monitor->material = material <= INT32_MAX ? (int32_t)material : -1;
+        const uint64_t cells = (uint64_t)monitor->columns * monitor->rows;
+        if (cells == 0 || cells > m->layer_count || monitor->first_layer > m->layer_count - cells) {
+            result = wrong(r, where, "columns, rows, firstLayer", "there are no such layers");
+            goto cleanup;
+        }
+    }
+cleanup:
+    return result;
+}
+
+static lx_result read_animations(const reader *r, const json_t *root)
+{
+    lx_result result = LX_OK;
+    lx_manifest *m = r->manifest;
+    const json_t *items = NULL;
+    LX_TRY(get_array(r, root, "", "animations", false, max_animations, sizeof *m->animations, &items, &m->animations, &m->animation_count));
+    for (uint32_t i = 0; i < m->animation_count; ++i) {
+        const json_t *item = json_array_get(items, i);
+        lx_manifest_animation *animation = &m->animations[i];
+        char where[place_bytes];
+        name_element(where, "animations", i);
+        LX_TRY(get_text(r, item, where, "name", "", &animation->name));
+        LX_TRY(get_uint(r, item, where, "layer", true, &animation->layer));
+        LX_TRY(get_text(r, item, where, "program", NULL, &animation->program));
+        LX_TRY(get_text(r, item, where, "channel", "light", &animation->channel));
+        LX_TRY(get_float(r, item, where, "duration", false, &animation->duration_s));
+        if (animation->layer >= m->layer_count) {
+            result = wrong(r, where, "layer", "there is no such layer");
+            goto cleanup;
+        }
+    }
+cleanup:
+    return result;
+}
+
 static lx_result read_sky(const reader *r, const json_t *root)
 {
     lx_result result = LX_OK;
@@ -529,6 +613,8 @@ lx_result lx_manifest_read(const char *text_data, size_t size, lx_manifest *out,
     LX_TRY(read_pages(&r, root));
     LX_TRY(read_layers(&r, root));
     LX_TRY(read_files(&r, root));
+    LX_TRY(read_monitors(&r, root));
+    LX_TRY(read_animations(&r, root));
     LX_TRY(read_sky(&r, root));
     LX_TRY(read_view(&r, root));
     LX_TRY(read_bake(&r, root));

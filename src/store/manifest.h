@@ -36,6 +36,23 @@ typedef struct lx_manifest_sky {
     float color[3], rotation_deg, intensity;
 } lx_manifest_sky;
 
+typedef struct lx_manifest_monitor {
+    const char *name;
+    uint32_t node;          ///< In the scene file.
+    int32_t material;       ///< Likewise; -1: none.
+    uint32_t columns, rows; ///< Cell k = row × columns + column is layer first_layer + k.
+    uint32_t first_layer;
+    float strength[3];      ///< c of a white pixel, nit.
+} lx_manifest_monitor;
+
+typedef struct lx_manifest_animation {
+    const char *name;    ///< Of the file's animation; "": `luxel_animate`.
+    uint32_t layer;
+    const char *program; ///< "keys", "blink", "flicker", "pulse", "wheel", "schedule", "constant".
+    const char *channel; ///< "light": colour × intensity. "color", "intensity".
+    float duration_s;    ///< Of keys; the period of others.
+} lx_manifest_animation;
+
 typedef struct lx_manifest_bake {
     uint32_t samples, bounces; ///< LX_BOUNCES_INF is written as "inf".
     const char *integrator;
@@ -56,7 +73,9 @@ typedef struct lx_manifest {
     lx_manifest_page *pages; ///< Arrays are owned.
     lx_manifest_layer *layers;
     lx_manifest_file *files;
-    uint32_t page_count, layer_count, file_count;
+    lx_manifest_monitor *monitors;
+    lx_manifest_animation *animations;
+    uint32_t page_count, layer_count, file_count, monitor_count, animation_count;
     bool has_sky, has_view;
     lx_manifest_sky sky;
     float view_ev;
