@@ -32,7 +32,7 @@ static void fill(lx_manifest *manifest)
         .has_view = true,
         .sky = {"sky.exr", {1, 0.5f, 0.25f}, 45, 3},
         .view_ev = -3.1415927f,
-        .bake = {256, LX_BOUNCES_INF, "path", 7, "avx2", 12.5, 8},
+        .bake = {256, LX_BOUNCES_INF, "path", 7, "avx2", 12.5, {0.5, 1, 0.25, 9, 0.125, 2, 3}, 8},
         .scene_hash = 0x0123456789abcdef,
         .pack_hash = 0xfedcba9876543210,
     };
