@@ -127,7 +127,10 @@ export class LayerList {
       el("div.bar", {}, this.filter),
       el("div.bar", {},
         el("button.button", { type: "button", title: "Mute every light; colours are kept", onclick: () => model.allOff() }, "All off"),
-        el("button.button", { type: "button", title: "Every light as authored", onclick: () => model.resetAll() }, "Authored"),
+        el("button.button", { type: "button", title: "Every light as authored", onclick: () => {
+          for (const group of monitors) group.clear();
+          model.resetAll();
+        } }, "Authored"),
         model.room.animations.length ? this.play : null),
       this.list, this.none);
     model.onchange((layer) => this.update(layer));

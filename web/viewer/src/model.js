@@ -101,7 +101,7 @@ export class Model {
   resetAll() {
     const listeners = this.listeners;
     this.listeners = new Set();
-    for (const layer of this.layers) if (!layer.media) this.reset(layer);
+    for (const layer of this.layers) if (!layer.media && this.isChanged(layer)) this.reset(layer);
     this.listeners = listeners;
     this.changed();
   }
@@ -132,16 +132,14 @@ export class Model {
 
   #apply(layer) {
     const { room } = this;
-    const { index } = layer.light;
-    if (layer.animation === "file") {
-      if (this.playing) room.setProgram(index, "file");
-      else {
-        room.setProgram(index, null);
-        room.resetLight(index);
-      }
+    const { index, authored } = layer.light;
+    const still = layer.animation === "none";
+    const asAuthored = still && this.ownAnimation(layer) === "none" && layer.color.equals(authored.color) && layer.intensity === authored.intensity;
+    if (layer.animation === "file" || asAuthored) {
+      room.resetLight(index); // to the file's animation where there is one
       return;
     }
-    if (layer.animation === "none") {
+    if (still) {
       room.setProgram(index, null);
       room.setLight(index, layer.color, layer.intensity);
       return;

@@ -63,14 +63,37 @@ export class MonitorGroup {
     return words.every((word) => text.includes(word));
   }
 
+  /** Brightness as a share of the authored one. */
   setFactor(factor) {
-    const before = this.factor;
     this.factor = factor;
+    const own = this.#ownPicture();
+    if (!this.video && !this.image && factor !== 1 && own) {
+      // The picture of the file, as a picture: so its cells and the screen itself follow the strength.
+      this.image = own;
+      this.own = true;
+      this.#own(true);
+      this.monitor.setImage(own);
+    } else if (this.own && factor === 1) {
+      this.clear();
+      return;
+    }
     this.monitor.strength = this.authored.clone().multiplyScalar(factor);
-    if (this.image) this.monitor.setImage(this.image);
-    else if (!this.video) for (const cell of this.cells) this.model.setIntensity(cell, before > 0 ? (cell.intensity / before) * factor : cell.light.authored.intensity * factor);
     this.update();
     this.stage.invalidate();
+  }
+
+  // What the screen shows as authored; a white screen has no picture.
+  #ownPicture() {
+    if (this.authoredPicture) return this.authoredPicture;
+    const image = this.monitor.meshes[0]?.material.emissiveMap?.image;
+    if (!image) {
+      const canvas = el("canvas", { width: 1, height: 1 });
+      const paint = canvas.getContext("2d");
+      paint.fillStyle = "#fff";
+      paint.fillRect(0, 0, 1, 1);
+      this.authoredPicture = canvas;
+    }
+    return (this.authoredPicture ??= image);
   }
 
   /** Plays a file: a picture or a video. */
@@ -158,8 +181,8 @@ export class MonitorGroup {
     this.#say("");
     this.factor = 1;
     this.monitor.strength = this.authored.clone();
-    this.monitor.setVideo(null);
     for (const cell of this.cells) this.model.reset(cell);
+    this.monitor.setVideo(null);
     this.update();
     this.stage.invalidate();
   }
@@ -180,6 +203,7 @@ export class MonitorGroup {
     }
     this.#own(false);
     this.video = this.image = null;
+    this.own = false;
     if (this.url) URL.revokeObjectURL(this.url);
     this.url = null;
     this.file.value = "";
@@ -191,7 +215,7 @@ export class MonitorGroup {
   }
 
   update() {
-    const media = Boolean(this.video || this.image);
+    const media = Boolean(this.video || this.image) && !this.own;
     this.solo.setAttribute("aria-pressed", this.#all("solo"));
     this.mute.setAttribute("aria-pressed", this.#all("muted"));
     this.slider.value = Math.round(sliderOf(this.factor, 1) * 1000);

@@ -188,10 +188,10 @@ export class Stage {
   /** Draws now. */
   draw() {
     this.dirty = false;
+    this.#develop(); // before the update, which takes the exposure along
     const start = performance.now();
     this.changed = this.room.update();
     const middle = performance.now();
-    this.#develop();
     this.renderer.render(this.room.scene, this.camera);
     const end = performance.now();
     this.timing.update = middle - start;
