@@ -87,6 +87,7 @@ void lxrt_bicubic_taps(float at, out vec2 taps, out vec2 weights) {
 vec3 lxrt_lightmap_sample_bicubic(sampler2DArray pages, float slice, vec2 uv) {
   vec2 size = vec2(textureSize(pages, 0).xy);
   vec2 x, y, weightsX, weightsY;
+  uv = clamp(uv, 0.0, 1.0);
   lxrt_bicubic_taps(uv.x * size.x, x, weightsX);
   lxrt_bicubic_taps(uv.y * size.y, y, weightsY);
   x /= size.x;

@@ -54,5 +54,31 @@ const stage = {
     return sum.map((value) => value / count);
   },
 };
+
+/** Runs `vec4 value(vec2 pixel)` for every pixel of a float target; returns RGBA floats, row 0 first. */
+stage.evaluate = (glsl, uniforms, width, height) => {
+  const material = new THREE.ShaderMaterial({
+    glslVersion: THREE.GLSL3,
+    uniforms: Object.fromEntries(Object.entries(uniforms).map(([name, value]) => [name, { value }])),
+    vertexShader: 'void main() { gl_Position = vec4(position.xy, 0.0, 1.0); }',
+    fragmentShader: `precision highp sampler2DArray;\nout vec4 outValue;\n${glsl}\nvoid main() { outValue = value(gl_FragCoord.xy); }`,
+    depthTest: false,
+  });
+  const triangle = new THREE.BufferGeometry();
+  triangle.setAttribute('position', new THREE.Float32BufferAttribute([-1, -1, 0, 3, -1, 0, -1, 3, 0], 3));
+  const target = new THREE.WebGLRenderTarget(width, height, { type: THREE.FloatType, depthBuffer: false });
+  const mesh = new THREE.Mesh(triangle, material);
+  mesh.frustumCulled = false;
+  renderer.setRenderTarget(target);
+  renderer.render(mesh, new THREE.Camera());
+  const values = new Float32Array(4 * width * height);
+  renderer.readRenderTargetPixels(target, 0, 0, width, height, values);
+  renderer.setRenderTarget(null);
+  target.dispose();
+  material.dispose();
+  triangle.dispose();
+  return values;
+};
+
 globalThis.stage = stage;
 document.body.dataset.ready = 'yes';
