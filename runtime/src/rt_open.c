@@ -273,6 +273,7 @@ static lxrt_result read_pack(const void *data, size_t size, lxrt_pack *pack)
                               sections[i].table);
         if (result != LXRT_OK) return result;
     }
+    pack->file_bytes = in.size;
     pack->block_index = index.data;
     pack->blocks = blocks.data;
     pack->block_count = blocks.count;
@@ -337,6 +338,8 @@ lxrt_result lxrt_open(const void *data, size_t size, void *memory, size_t memory
     pack->drivers = (lxrt_driver *)(void *)(aligned + layout.drivers);
     pack->animation_states = (lxrt_animation_state *)(void *)(aligned + layout.animation_states);
     pack->monitor_states = (lxrt_monitor_state *)(void *)(aligned + layout.monitor_states);
+    pack->handle_bytes = layout.total;
+    pack->kernel = lxrt_best_kernel();
     for (uint32_t i = 0; i < pack->layer_count; ++i) read_authored_color(lxrt_element(&pack->layers, i), &pack->colors[i]);
     lxrt_begin_drivers(pack);
     lxrt_begin_monitors(pack);

@@ -3,6 +3,7 @@
 #define LXRT_RT_PACK_H
 
 #include "luxel_rt.h"
+#include "rt_kernel.h"
 
 #include <string.h>
 
@@ -42,6 +43,9 @@ struct lxrt_pack {
     struct lxrt_driver *drivers;               // [layer_count], rt_drive.h
     struct lxrt_animation_state *animation_states; // [animations.count], rt_drive.h
     struct lxrt_monitor_state *monitor_states; // [monitors.count], rt_monitor.h
+    uint64_t file_bytes;
+    size_t handle_bytes;
+    lxrt_kernel kernel; // of the composer
 };
 
 // Little-endian numbers at any address. Compilers turn these into plain loads.
