@@ -26,25 +26,25 @@ static const char style[] =
     "main{max-width:1080px;margin:0 auto;padding:clamp(16px,4vw,48px)}"
     "h1{font-size:clamp(1.6rem,5vw,2.4rem);line-height:1.15;letter-spacing:-.02em;margin:0}"
     "h2{font-size:1.15rem;letter-spacing:-.01em;margin:2.6em 0 .8em}"
-    "p{margin:.3em 0}.soft{color:var(--soft)}small,.small{font-size:.85rem}"
+    "p{margin:.3em 0}h2+p{margin:-.4em 0 1em}.soft{color:var(--soft)}small,.small{font-size:.85rem}"
     "header p{color:var(--soft);margin:.5em 0 1.4em}"
     ".hero{display:block;width:100%;height:auto;border-radius:10px;background:#000}"
-    ".figures{display:grid;grid-template-columns:repeat(auto-fit,minmax(8.5rem,1fr));gap:1px;background:var(--line);"
+    ".figures{display:grid;grid-template-columns:repeat(auto-fit,minmax(8.5rem,1fr));gap:1px;background:var(--card);"
     "border:1px solid var(--line);border-radius:10px;overflow:hidden;margin-top:20px}"
-    ".figures div{background:var(--card);padding:12px 14px}"
+    ".figures div{padding:12px 14px;box-shadow:0 0 0 1px var(--line)}"
     ".figures b{display:block;font-size:1.35rem;font-weight:600;letter-spacing:-.02em;font-variant-numeric:tabular-nums}"
     ".figures span{color:var(--soft);font-size:.8rem}"
     ".warn{background:var(--warn);border:1px solid var(--warnline);border-radius:10px;padding:12px 18px;margin-top:20px}"
     ".warn ul{margin:.3em 0 0;padding-left:1.1em}.warn li{margin:.25em 0}"
-    ".layers{display:grid;grid-template-columns:repeat(auto-fill,minmax(150px,1fr));gap:14px}"
+    ".layers{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(44%,190px),1fr));gap:14px;align-items:start}"
     ".pages{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,300px),1fr));gap:18px}"
     "figure{margin:0;background:var(--card);border:1px solid var(--line);border-radius:10px;overflow:hidden;break-inside:avoid}"
-    "figure img{display:block;width:100%;height:auto;aspect-ratio:1;background:#000}"
+    "figure img{display:block;width:100%;height:auto;background:#000}"
     "figcaption{padding:9px 12px 11px;font-size:.85rem;line-height:1.4}"
     "figcaption b{display:flex;gap:.5em;align-items:baseline;font-size:.95rem}"
     ".swatch{flex:none;width:.8em;height:.8em;border-radius:50%;border:1px solid var(--line);print-color-adjust:exact;"
     "-webkit-print-color-adjust:exact}"
-    "figure .cells{aspect-ratio:auto;image-rendering:pixelated;border-top:1px solid var(--line)}"
+    "figure .cells{image-rendering:pixelated;border-top:1px solid var(--line)}"
     ".two{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,380px),1fr));gap:0 40px}"
     "table{width:100%;border-collapse:collapse;font-variant-numeric:tabular-nums}"
     "td,th{padding:6px 0;border-bottom:1px solid var(--line);text-align:left;font-weight:400;vertical-align:baseline}"
@@ -197,14 +197,19 @@ static void set_all(lx_baked *baked, const lx_manifest *manifest, bool on)
         lxrt_set_layer(baked->pack, i, on ? manifest->layers[i].color : (const float[3]){0, 0, 0}, manifest->layers[i].intensity);
 }
 
-// What shines in the pack now, on the page where it shines most.
-static lx_result add_thumbnail(const lx_report *report, lx_builder *html, lx_error *error)
+// What shines in the pack now: as the preview's camera sees it, else on the page where it shines most.
+static lx_result add_thumbnail(const lx_report *report, lx_builder *html, bool *out_black, lx_error *error)
 {
     lx_result result = LX_OK;
     lx_image image = {0};
     uint32_t page;
-    LX_TRY(lx_report_brightest_page(report->baked, &page, error));
-    LX_TRY(lx_report_page_picture(report->baked, page, thumbnail_pixels, NAN, &image, error));
+    *out_black = false;
+    if (report->seen) {
+        LX_TRY(lx_report_seen_picture(report->baked, report->seen, &image, out_black, error));
+    } else {
+        LX_TRY(lx_report_brightest_page(report->baked, &page, error));
+        LX_TRY(lx_report_page_picture(report->baked, page, thumbnail_pixels, &image, error));
+    }
     lx_builder_format(html, "<figure><img loading=\"lazy\" width=\"%u\" height=\"%u\" alt=\"\" src=\"", image.width, image.height);
     LX_TRY(lx_report_add_jpeg(html, &image, 82, error));
     lx_builder_add(html, "\">");
@@ -234,7 +239,8 @@ static lx_result add_layer(const lx_report *report, uint32_t index, lx_builder *
     const lx_manifest_layer *layer = &report->manifest->layers[index];
     const bool dark = layer->color[0] <= 0 && layer->color[1] <= 0 && layer->color[2] <= 0;
     lxrt_set_layer(report->baked->pack, index, dark ? white : layer->color, 1);
-    const lx_result result = add_thumbnail(report, html, error);
+    bool out_of_sight;
+    const lx_result result = add_thumbnail(report, html, &out_of_sight, error);
     lxrt_set_layer(report->baked->pack, index, white, 0);
     lx_builder_add(html, "<figcaption><b>");
     add_swatch(html, layer->color);
@@ -252,6 +258,7 @@ static lx_result add_layer(const lx_report *report, uint32_t index, lx_builder *
     }
     const uint32_t sources = count_sources(report->baked, index);
     if (sources != 1) lx_builder_format(html, ", %u sources", sources);
+    if (out_of_sight) lx_builder_add(html, ", out of sight here");
     lx_builder_add(html, "</span></figcaption></figure>\n");
     return result;
 }
@@ -291,7 +298,7 @@ static lx_result add_monitor(const lx_report *report, const lxrt_monitor *monito
     lx_result result = LX_OK;
     const lx_manifest *manifest = report->manifest;
     const uint32_t first = monitor->first_layer, last = first + monitor->columns * monitor->rows - 1;
-    bool dark = true;
+    bool dark = true, out_of_sight;
     for (uint32_t i = first; i <= last; ++i) {
         const lx_manifest_layer *layer = &manifest->layers[i];
         for (int k = 0; k < 3; ++k) dark &= !(layer->color[k] * layer->intensity > 0);
@@ -299,7 +306,7 @@ static lx_result add_monitor(const lx_report *report, const lxrt_monitor *monito
     for (uint32_t i = first; i <= last; ++i)
         lxrt_set_layer(report->baked->pack, i, dark ? (const float[3]){1, 1, 1} : manifest->layers[i].color,
                        dark ? 1 : manifest->layers[i].intensity);
-    LX_TRY(add_thumbnail(report, html, error));
+    LX_TRY(add_thumbnail(report, html, &out_of_sight, error));
     LX_TRY(add_cells(report, monitor, html, error));
     for (uint32_t i = first; i <= last; ++i) lxrt_set_layer(report->baked->pack, i, (const float[3]){0, 0, 0}, 0);
     lx_builder_add(html, "<figcaption><b><span>");
@@ -326,7 +333,7 @@ static lx_result add_layers(const lx_report *report, lx_builder *html, lx_error 
     lx_result result = LX_OK;
     const lx_manifest *manifest = report->manifest;
     uint32_t shown = 0, layer = 0;
-    lx_builder_add(html, "<section><h2>Layers</h2><p class=\"soft small\">What each of them brings to the lightmap, in its authored colour, each at an "
+    lx_builder_add(html, "<section><h2>Layers</h2><p class=\"soft small\">What each of them brings to the surfaces, in its authored colour, each at an "
                          "exposure of its own.</p>\n<div class=\"layers\">\n");
     set_all(report->baked, manifest, false);
     for (; layer < manifest->layer_count && shown < most_thumbnails; ++shown) {
@@ -363,7 +370,7 @@ static lx_result add_atlas(const lx_report *report, lx_builder *html, lx_error *
     set_all(report->baked, manifest, true);
     for (uint32_t page = 0; page < manifest->page_count; ++page) {
         lx_image image = {0};
-        lx_result result = lx_report_page_picture(report->baked, page, atlas_pixels, manifest->has_view ? manifest->view_ev : NAN, &image, error);
+        lx_result result = lx_report_page_picture(report->baked, page, atlas_pixels, &image, error);
         if (result == LX_OK) {
             lx_builder_format(html, "<figure><img loading=\"lazy\" width=\"%u\" height=\"%u\" alt=\"Atlas page %u\" src=\"", image.width,
                               image.height, page);

@@ -1,4 +1,4 @@
-// Pictures of lightmap pages: small, tone-mapped, as JPEG.
+// Pictures of lightmap pages and of what a camera sees of them: small, tone-mapped, as JPEG.
 #include "api/report.h"
 
 #include "base/error.h"
@@ -8,8 +8,6 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-
-static const float pi = 3.14159265f;
 
 lx_result lx_report_add_jpeg(lx_builder *html, const lx_image *image, int quality, lx_error *error)
 {
@@ -69,8 +67,8 @@ static int compare_floats(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-// Exposure by which all but the brightest fortieth of what is lit stays below white.
-static lx_result bright_exposure(const float *rgb, size_t count, float *out, lx_error *error)
+// Exposure by which all but the brightest fortieth of what is lit stays below white. *out_black: nothing is lit.
+static lx_result bright_exposure(const float *rgb, size_t count, float *out, bool *out_black, lx_error *error)
 {
     float *lit = lx_malloc_array(count, sizeof *lit);
     if (!lit) return lx_fail_memory(error, "report");
@@ -82,15 +80,31 @@ static lx_result bright_exposure(const float *rgb, size_t count, float *out, lx_
         if (luminance > largest * 1e-4f) lit[lit_count++] = luminance;
     }
     qsort(lit, lit_count, sizeof *lit, compare_floats);
-    *out = lit_count ? log2f(0.8f * pi / lit[lit_count - 1 - lit_count / 40]) : 0;
+    *out_black = lit_count == 0;
+    *out = lit_count ? log2f(0.8f / lit[lit_count - 1 - lit_count / 40]) : 0;
     lx_free(lit);
     return LX_OK;
 }
 
-lx_result lx_report_page_picture(const lx_baked *baked, uint32_t page, uint32_t largest, float ev, lx_image *out, lx_error *error)
+static lx_result develop(const float *rgb, uint32_t width, uint32_t height, lx_image *out, bool *out_black, lx_error *error)
+{
+    lx_result result = LX_OK;
+    float ev = 0;
+    lx_render_desc desc = lx_render_desc_default();
+    desc.width = width;
+    desc.height = height;
+    LX_TRY(bright_exposure(rgb, (size_t)width * height, &ev, out_black, error));
+    LX_TRY(lx_image_create(width, height, 3, LX_PIXEL_U8, out, error));
+    lx_render_develop(&desc, ev, rgb, out->u8);
+cleanup:
+    return result;
+}
+
+lx_result lx_report_page_picture(const lx_baked *baked, uint32_t page, uint32_t largest, lx_image *out, lx_error *error)
 {
     lx_result result = LX_OK;
     float *rgb = NULL;
+    bool black;
     uint32_t size;
     const uint32_t level = choose_level(baked, largest, &size);
     LX_TRY(compose(baked, page, level, size, &rgb, error));
@@ -98,14 +112,18 @@ lx_result lx_report_page_picture(const lx_baked *baked, uint32_t page, uint32_t 
         shrink(rgb, size, largest);
         size = largest;
     }
-    const size_t count = (size_t)size * size;
-    if (isnan(ev)) LX_TRY(bright_exposure(rgb, count, &ev, error));
-    for (size_t i = 0; i < 3 * count; ++i) rgb[i] /= pi;
-    LX_TRY(lx_image_create(size, size, 3, LX_PIXEL_U8, out, error));
-    lx_render_desc desc = lx_render_desc_default();
-    desc.width = desc.height = size;
-    lx_render_develop(&desc, ev, rgb, out->u8);
+    LX_TRY(develop(rgb, size, size, out, &black, error));
 cleanup:
+    lx_free(rgb);
+    return result;
+}
+
+lx_result lx_report_seen_picture(const lx_baked *baked, const lx_seen *seen, lx_image *out, bool *out_black, lx_error *error)
+{
+    float *rgb = lx_malloc_array((size_t)seen->width * seen->height, 3 * sizeof *rgb);
+    if (!rgb) return lx_fail_memory(error, "report");
+    lx_seen_light(seen, baked, rgb);
+    const lx_result result = develop(rgb, seen->width, seen->height, out, out_black, error);
     lx_free(rgb);
     return result;
 }

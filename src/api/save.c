@@ -78,7 +78,19 @@ cleanup:
 static lx_result write_report(const lx_bake *bake, lx_baked *baked, const lx_new_folder *folder, const lx_manifest *manifest,
                               const lx_image *preview, lx_error *error)
 {
+    enum { thumbnail_width = 240, thumbnail_samples = 4 };
+    lx_result result = LX_OK;
     lx_builder html = {0};
+    lx_seen seen = {0};
+    if (preview) {
+        lx_render_desc desc = lx_render_desc_default();
+        desc.width = thumbnail_width;
+        desc.height = (uint32_t)((uint64_t)thumbnail_width * preview->height / preview->width);
+        if (desc.height == 0) desc.height = 1;
+        if (desc.height > 4 * thumbnail_width) desc.height = 4 * thumbnail_width;
+        desc.samples = thumbnail_samples;
+        LX_TRY(lx_seen_create(baked, &desc, &seen, error));
+    }
     const lx_report report = {
         .title = lx_path_name(folder->path),
         .files_folder = folder->partial,
@@ -86,9 +98,12 @@ static lx_result write_report(const lx_bake *bake, lx_baked *baked, const lx_new
         .baked = baked,
         .manifest = manifest,
         .preview = preview,
+        .seen = preview ? &seen : NULL,
     };
-    lx_result result = lx_report_build(&report, &html, error);
-    if (result == LX_OK) result = lx_new_folder_write(folder, "report.html", html.text, html.length, error);
+    LX_TRY(lx_report_build(&report, &html, error));
+    LX_TRY(lx_new_folder_write(folder, "report.html", html.text, html.length, error));
+cleanup:
+    lx_seen_release(&seen);
     lx_builder_release(&html);
     return result;
 }

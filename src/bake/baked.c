@@ -362,19 +362,14 @@ lx_result lx_baked_compose(const lx_baked *baked, uint32_t page, float *out_rgb,
 
 void lx_baked_get_budget(const lx_baked *baked, lx_budget *out)
 {
-    lxrt_info info;
-    size_t handle = 0;
-    lxrt_get_info(baked->pack, &info);
-    lxrt_memory_bytes(baked->pack_data.data, baked->pack_data.size, &handle);
-    uint64_t texels = 0; // of one page with its mips
-    for (uint32_t level = 0; level < info.level_count; ++level) texels += (uint64_t)(info.page_size >> level) * (info.page_size >> level);
-    const uint64_t composed = 4 * texels * info.page_count;
+    lxrt_budget budget;
+    lxrt_get_budget(baked->pack, &budget);
     *out = (lx_budget){
-        .ram = baked->pack_data.size + handle,
-        .accumulator = 12 * texels * info.page_count,
-        .gpu_composed = composed,
-        .gpu_layers = composed * info.layer_count,
-        .dense = composed * info.layer_count,
+        .ram = budget.pack_bytes + budget.handle_bytes,
+        .accumulator = budget.accumulator_bytes,
+        .gpu_composed = budget.gpu_composed_bytes,
+        .gpu_layers = budget.gpu_layers_bytes,
+        .dense = budget.dense_bytes,
     };
 }
 

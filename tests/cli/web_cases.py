@@ -1,6 +1,8 @@
 """luxel view and luxel export-web: what a person, a browser and a stranger get from them. Part of cases.py."""
 
+import base64
 import contextlib
+import html.parser
 import json
 import os
 import re
@@ -15,6 +17,7 @@ import time
 
 from harness import case, expect, Failed, luxel, read, refused, start, tree, write
 import scenes
+from gltf import quad
 
 SECRET = b"the secret of another folder"
 
@@ -512,3 +515,128 @@ def export_web_works_below_a_path_of_a_plain_server():
     finally:
         process.kill()
         process.wait()
+
+
+# --- report.html --------------------------------------------------------------------------------------------------------
+
+
+class Page(html.parser.HTMLParser):
+    """Checks that every element is closed where it must be, and collects what is shown and what is asked for."""
+
+    VOID = {"meta", "img", "br"}
+
+    def __init__(self, text):
+        super().__init__(convert_charrefs=True)
+        self.open, self.addresses, self.tags, self.text, self.handlers = [], [], [], "", []
+        self.feed(text)
+        self.close()
+        expect(self.open == [], "not closed: %s" % self.open)
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append(tag)
+        if tag not in self.VOID:
+            self.open.append(tag)
+        for name, value in attributes:
+            if name in ("src", "href", "srcset", "data", "action", "poster", "background"):
+                self.addresses.append(value)
+            if name.startswith("on"):
+                self.handlers.append(name)
+
+    def handle_endtag(self, tag):
+        expect(self.open and self.open[-1] == tag, "</%s> closes %s" % (tag, self.open[-1:]))
+        self.open.pop()
+
+    def handle_data(self, data):
+        if "style" not in self.open:
+            self.text += data
+
+
+def report(folder):
+    raw = read(folder + "/report.html")
+    text = raw.decode("utf-8")
+    page = Page(text)
+    expect(text.startswith("<!DOCTYPE html>") and page.tags[:2] == ["html", "head"], text[:100])
+    expect(page.handlers == [] and "script" not in page.tags, "scripts: %s" % page.handlers)
+    for address in page.addresses:
+        expect(address.startswith("data:image/"), "an address of elsewhere: %s" % address[:100])
+        kind, data = re.fullmatch(r"data:image/(jpeg|png);base64,([A-Za-z0-9+/=]+)", address).groups()
+        data = base64.b64decode(data, validate=True)
+        expect(data.startswith(b"\xff\xd8\xff" if kind == "jpeg" else b"\x89PNG"), "%s: %r" % (kind, data[:10]))
+    for foreign in ("http:", "https:", "url(", "@import", "//"):
+        expect(foreign not in re.sub(r'"data:[^"]*"', "", text), "'%s' in the page" % foreign)
+    return page
+
+
+@case
+def report_shows_layers_sizes_times_and_settings():
+    make_baked("room.baked", "--sky", "0.2,0.3,0.5", "--seed", "77")
+    page = report("room.baked")
+    expect(page.tags.count("img") == 1 + 4 + 1, "%d pictures" % page.tags.count("img"))
+    for word in ("room.baked", "lamp", "neon left", "neon right", "sky", "10.0\u00a0cd", "Page 0", "64 × 64", "covered", "texels per metre", "RAM",
+                 "GPU, composed", "GPU, all layers", "scene.glb", "luxel.pack", "preview.png", "sky.hdr", "import", "unwrap", "luxels", "bake", "post",
+                 "save", "preview", "77", "samples per texel", "direct and bounced"):
+        expect(word in page.text, "no '%s' in: %s" % (word, page.text))
+    expect("warning" not in page.text, page.text)
+    expect(os.path.getsize("room.baked/report.html") < 400000, "%d bytes" % os.path.getsize("room.baked/report.html"))
+    make_baked("other.baked", "--no-preview")  # layers as they lie in the atlas
+    page = report("other.baked")
+    expect(page.tags.count("img") == 3 + 1, "%d pictures" % page.tags.count("img"))
+    make_baked("none.baked", "--no-preview", "--no-report")
+    expect(not os.path.exists("none.baked/report.html"), "there is a report")
+
+
+@case
+def report_shows_any_names_as_they_are():
+    g = scenes.room()
+    names = ["<script>alert(1)</script>", "\"><img src=http://evil.example/x onerror='x'>", "Straße & Söhne\u202e"]
+    for node, name in zip(g.json["nodes"][2:5], names):
+        node["name"] = name
+    g.json["nodes"][0].setdefault("extras", {})["luxel_</li><b>"] = 1
+    write("room.glb", g.to_bytes())
+    folder = "a&b<i>.baked"
+    luxel("bake", "room.glb", "-o", folder, "--page-size", "64", "--samples", "1", "--quiet", "--no-preview")
+    text = read(folder + "/report.html").decode()
+    page = Page(text)
+    for name in names:
+        expect(name.replace("\u202e", "\ufffd") in page.text, "no %r in: %s" % (name, page.text))
+    expect(folder in page.text and "1 warning" in page.text and "luxel_</li><b>" in page.text, page.text)
+    expect("script" not in page.tags and "i" in page.tags and page.handlers == [], "%s" % set(page.tags))
+    expect(all(address.startswith("data:") for address in page.addresses), "%s" % [a[:60] for a in page.addresses])
+
+
+@case
+def report_shows_monitors_as_one():
+    g = scenes.room()
+    screen = g.add_material("screen", (0, 0, 0), emissive=(1, 0.9, 0.8), strength=40)
+    g.add_node("tv", mesh=g.add_mesh("tv", (quad(1.6, 0.9), screen)), translation=(0, 1, -1), extras={"luxel_monitor": "8x5"})
+    write("room.glb", g.to_bytes())
+    luxel("bake", "room.glb", "-o", "room.baked", "--page-size", "64", "--samples", "1", "--quiet", "--max-layers", "100")
+    page = report("room.baked")
+    layers = json.loads(read("room.baked/luxel.json"))["layers"]
+    expect(len(layers) == 3 + 40, "%d layers" % len(layers))
+    expect("8 × 5 cells" in page.text and layers[3]["name"] in page.text and layers[-1]["name"] in page.text, page.text)
+    expect(page.tags.count("img") == 1 + 3 + 2 + 1, "%d pictures" % page.tags.count("img"))
+
+
+@case
+def stages_and_memory_are_told_everywhere():
+    write("room.glb", scenes.GOOD)
+    result = luxel("bake", "room.glb", "-o", "room.baked", "--page-size", "64", "--samples", "1", "--json", "--no-preview")
+    summary, manifest = json.loads(result.out), json.loads(read("room.baked/luxel.json"))
+    inspected = json.loads(luxel("inspect", "room.baked", "--json").out)
+    expect(summary["memory"] == manifest["memory"] == inspected["memory"], "%s\n%s" % (summary["memory"], inspected["memory"]))
+    memory = summary["memory"]
+    texels = 64 * 64 + 32 * 32 + 16 * 16  # padding 4: three levels
+    expect(memory["gpu_composed"] == 4 * texels and memory["gpu_layers"] == 3 * 4 * texels, "%s" % memory)
+    expect(summary["pack_bytes"] <= memory["ram"] <= summary["pack_bytes"] + 65536, "%s" % memory)
+    expect(memory["accumulator"] >= 12 * texels and memory["dense"] >= memory["gpu_layers"], "%s" % memory)
+    stages = summary["stages"]
+    expect(set(stages) == {"import", "unwrap", "luxels", "bake", "post", "save", "preview"}, "%s" % stages)
+    expect(all(value > 0 for name, value in stages.items() if name != "preview") and stages["preview"] == 0, "%s" % stages)
+    expect(sum(stages.values()) <= summary["total_seconds"], "%s in %g s" % (stages, summary["total_seconds"]))
+    for key, value in manifest["bake"]["stages"].items():
+        expect(abs(stages[key] - value) < 1e-6, "%s: %g and %g" % (key, stages[key], value))
+    text = luxel("inspect", "room.baked").out
+    expect(re.search(r"\nmemory\n  ram +[\d.]+ KiB\n", text) and re.search(r"gpu_composed +21\.0 KiB", text), text)
+    text = luxel("bake", "room.glb", "-o", "room.baked", "--page-size", "64", "--samples", "1", "--no-preview").out
+    expect(re.search(r"\n  memory +[\d.]+ KiB in RAM.*\n  GPU +21\.0 KiB composed.*63\.0 KiB as layers\n", text), text)
