@@ -273,6 +273,7 @@ static lxrt_result read_pack(const void *data, size_t size, lxrt_pack *pack)
                               sections[i].table);
         if (result != LXRT_OK) return result;
     }
+    pack->file_bytes = in.size;
     pack->block_index = index.data;
     pack->blocks = blocks.data;
     pack->block_count = blocks.count;
@@ -333,6 +334,8 @@ lxrt_result lxrt_open(const void *data, size_t size, void *memory, size_t memory
     unsigned char *aligned = (unsigned char *)memory + (misaligned ? memory_alignment - misaligned : 0);
     lxrt_pack *pack = (lxrt_pack *)(void *)aligned;
     *pack = local;
+    pack->handle_bytes = layout.total;
+    pack->kernel = lxrt_best_kernel();
     pack->colors = (lxrt_color *)(void *)(aligned + layout.colors);
     pack->drivers = (lxrt_driver *)(void *)(aligned + layout.drivers);
     pack->animation_states = (lxrt_animation_state *)(void *)(aligned + layout.animation_states);

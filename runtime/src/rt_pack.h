@@ -3,6 +3,7 @@
 #define LXRT_RT_PACK_H
 
 #include "luxel_rt.h"
+#include "rt_kernel.h"
 
 #include <string.h>
 
@@ -30,6 +31,7 @@ typedef struct lxrt_color {
 struct lxrt_driver;
 struct lxrt_animation_state;
 struct lxrt_monitor_state;
+struct lxrt_pixel_block;
 
 struct lxrt_pack {
     uint32_t page_size, page_count, layer_count, level_count;
@@ -42,6 +44,10 @@ struct lxrt_pack {
     struct lxrt_driver *drivers;               // [layer_count], rt_drive.h
     struct lxrt_animation_state *animation_states; // [animations.count], rt_drive.h
     struct lxrt_monitor_state *monitor_states; // [monitors.count], rt_monitor.h
+    void (*pixel_sum)(const struct lxrt_pixel_block *block, uint64_t sums[3]); // for this processor, rt_pixels.h
+    uint64_t file_bytes;
+    size_t handle_bytes;
+    lxrt_kernel kernel; // of the composer
 };
 
 // Little-endian numbers at any address. Compilers turn these into plain loads.
