@@ -100,16 +100,23 @@ static void sum_bytes(const lxrt_pack *pack, const picture *from, const uint32_t
     }
 }
 
+// All four channels alike and without branches, which compilers turn into one vector; alpha's sum is thrown away.
 static void sum_floats(const picture *from, const part *x, const part *y, double sums[3])
 {
+    const uint32_t exponent = 0x7f800000; // all ones: infinite or no number
+    double all[4] = {0, 0, 0, 0};
     for (uint32_t row = y->begin; row < y->end; ++row) {
         const unsigned char *pixel = from->pixels + row * from->stride + (size_t)x->begin * from->pixel_bytes;
         for (uint32_t column = x->begin; column < x->end; ++column, pixel += from->pixel_bytes) {
-            float rgb[3];
-            memcpy(rgb, pixel, sizeof rgb); // of any alignment
-            for (int i = 0; i < 3; ++i) sums[i] += isfinite(rgb[i]) ? rgb[i] : 0;
+            uint32_t bits[4];
+            float rgba[4];
+            memcpy(bits, pixel, sizeof bits); // of any alignment
+            for (int i = 0; i < 4; ++i) bits[i] = (bits[i] & exponent) == exponent ? 0 : bits[i];
+            memcpy(rgba, bits, sizeof rgba);
+            for (int i = 0; i < 4; ++i) all[i] += rgba[i];
         }
     }
+    for (int i = 0; i < 3; ++i) sums[i] = all[i];
 }
 
 // Mean of the linear pixels in a cell.
