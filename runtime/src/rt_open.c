@@ -1,5 +1,7 @@
 // Opening a pack: everything that hostile data could get wrong is checked here, once, so that the rest may trust the tables.
 // Layout: docs/pack-format.md.
+#include "rt_drive.h"
+#include "rt_monitor.h"
 #include "rt_pack.h"
 
 #include <math.h>
@@ -15,11 +17,12 @@ enum {
     layer_bytes = 48,
     rect_bytes = 48,
     source_bytes = 40,
+    monitor_bytes = 48,
+    animation_bytes = 80,
+    max_monitor_edge = 4096,
     memory_alignment = 16,
 };
 
-// The largest factor a texel is multiplied by: sums of a million layers at that and at 65408 stay finite.
-#define MAX_FACTOR 1e27f
 #define MAX_SCALE 0x1p100f
 
 const char *lxrt_result_name(lxrt_result result)
@@ -114,11 +117,6 @@ static int is_name(const lxrt_pack *pack, const unsigned char *reference)
     return end < pack->strings.count && pack->strings.data[end] == 0;
 }
 
-static const char *name_of(const lxrt_pack *pack, const unsigned char *reference)
-{
-    return (const char *)pack->strings.data + lxrt_load_u32(reference);
-}
-
 static int is_scale(float scale)
 {
     int exponent;
@@ -130,7 +128,7 @@ static int color_factors(const float color[3], float scale, float out_factor[3])
 {
     for (int i = 0; i < 3; ++i) {
         out_factor[i] = color[i] * scale;
-        if (!(fabsf(color[i]) <= MAX_FACTOR && fabsf(out_factor[i]) <= MAX_FACTOR)) return 0; // NaN fails too
+        if (!(fabsf(color[i]) <= LXRT_MAX_FACTOR && fabsf(out_factor[i]) <= LXRT_MAX_FACTOR)) return 0; // NaN fails too
     }
     return 1;
 }
@@ -197,6 +195,46 @@ static int check_sources(const lxrt_pack *pack)
     return 1;
 }
 
+static int check_monitors(const lxrt_pack *pack)
+{
+    for (uint32_t i = 0; i < pack->monitors.count; ++i) {
+        const unsigned char *monitor = lxrt_element(&pack->monitors, i);
+        const uint32_t columns = lxrt_load_u32(monitor + 16), rows = lxrt_load_u32(monitor + 20);
+        if (!is_name(pack, monitor) || (int32_t)lxrt_load_u32(monitor + 12) < -1 || columns < 1 || columns > max_monitor_edge || rows < 1 ||
+            rows > max_monitor_edge || (uint64_t)lxrt_load_u32(monitor + 24) + columns * rows > pack->layer_count)
+            return 0;
+        for (int k = 0; k < 3; ++k) {
+            const float strength = lxrt_load_f32(monitor + 28 + 4 * k);
+            if (!(strength >= 0 && strength <= LXRT_MAX_FACTOR)) return 0;
+        }
+    }
+    return 1;
+}
+
+// Keys belong to one animation each, so that their checks take no longer than the file is large.
+static int check_animations(const lxrt_pack *pack)
+{
+    const lxrt_table *numbers = &pack->animation_keys;
+    uint64_t used = 0;
+    for (uint32_t i = 0; i < numbers->count; ++i)
+        if (!are_finite(lxrt_element(numbers, i), 1)) return 0;
+    for (uint32_t i = 0; i < pack->animations.count; ++i) {
+        const unsigned char *data = lxrt_element(&pack->animations, i);
+        if (!is_name(pack, data) || lxrt_load_u32(data + 8) >= pack->layer_count || lxrt_load_u32(data + 76) > 1) return 0;
+        const uint32_t channel = lxrt_load_u32(data + 16), first = lxrt_load_u32(data + 24), count = lxrt_load_u32(data + 28);
+        const lxrt_program program = lxrt_stored_program(data);
+        if (!lxrt_is_program(&program) || channel > lxrt_channel_intensity || (channel != 0 && program.kind != LXRT_PROGRAM_KEYS) ||
+            (program.interpolation == LXRT_CUBIC && program.kind != LXRT_PROGRAM_KEYS))
+            return 0;
+        if (!lxrt_has_keys(&program)) continue;
+        const lxrt_keys keys = lxrt_stored_keys(pack, data);
+        const uint64_t bytes = (uint64_t)count * lxrt_key_stride(&keys);
+        used += bytes;
+        if (first > numbers->count || bytes > numbers->count - first || used > numbers->count || !lxrt_are_keys(&program, &keys)) return 0;
+    }
+    return 1;
+}
+
 static int check_block_index(const lxrt_pack *pack, const lxrt_table *index)
 {
     // 2^16 pages × 2^20 layers × 2^19 entries fit 64 bits
@@ -227,7 +265,8 @@ static lxrt_result read_pack(const void *data, size_t size, lxrt_pack *pack)
     } sections[] = {
         {"PAGE", page_bytes, 1, &pack->pages},  {"LAYR", layer_bytes, 1, &pack->layers},   {"STRS", 1, 1, &pack->strings},
         {"RECT", rect_bytes, 0, &pack->rects},  {"SRCE", source_bytes, 0, &pack->sources}, {"BIDX", 4, 1, &index},
-        {"BLKS", lxrt_block_bytes, 1, &blocks},
+        {"BLKS", lxrt_block_bytes, 1, &blocks}, {"MONI", monitor_bytes, 0, &pack->monitors},
+        {"ANIM", animation_bytes, 0, &pack->animations}, {"AKEY", 4, 0, &pack->animation_keys},
     };
     for (size_t i = 0; i < sizeof sections / sizeof *sections; ++i) {
         result = find_section(&in, section_count, section_offset, sections[i].type, sections[i].element_bytes, sections[i].required,
@@ -239,16 +278,38 @@ static lxrt_result read_pack(const void *data, size_t size, lxrt_pack *pack)
     pack->blocks = blocks.data;
     pack->block_count = blocks.count;
     if (pack->pages.count != pack->page_count || pack->layers.count != pack->layer_count || pack->strings.stride != 1 ||
-        blocks.stride != lxrt_block_bytes)
+        blocks.stride != lxrt_block_bytes || pack->animation_keys.stride != 4)
         return LXRT_ERROR_CORRUPT;
-    if (!check_pages(pack) || !check_layers(pack) || !check_rects(pack) || !check_sources(pack) || !check_block_index(pack, &index))
+    if (!check_pages(pack) || !check_layers(pack) || !check_rects(pack) || !check_sources(pack) || !check_monitors(pack) ||
+        !check_animations(pack) || !check_block_index(pack, &index))
         return LXRT_ERROR_CORRUPT;
     return LXRT_OK;
 }
 
-static size_t memory_needed(const lxrt_pack *pack)
+// Where the parts of a handle begin, from its aligned start.
+typedef struct memory_layout {
+    size_t colors, drivers, animation_states, monitor_states, total;
+} memory_layout;
+
+// The next part, after `count` elements; returns where they begin. No overflow: the largest part, a million drivers, is below 2^28 bytes
+// and the others are smaller than the file.
+static size_t place(size_t *end, uint32_t count, size_t element_bytes)
 {
-    return memory_alignment + sizeof *pack + pack->layer_count * sizeof *pack->colors;
+    const size_t begin = (*end + memory_alignment - 1) / memory_alignment * memory_alignment;
+    *end = begin + count * element_bytes;
+    return begin;
+}
+
+static memory_layout lay_out_memory(const lxrt_pack *pack)
+{
+    memory_layout out;
+    size_t end = sizeof *pack;
+    out.colors = place(&end, pack->layer_count, sizeof *pack->colors);
+    out.drivers = place(&end, pack->layer_count, sizeof *pack->drivers);
+    out.animation_states = place(&end, pack->animations.count, sizeof *pack->animation_states);
+    out.monitor_states = place(&end, pack->monitors.count, sizeof *pack->monitor_states);
+    out.total = end + memory_alignment; // the caller's memory may begin anywhere
+    return out;
 }
 
 lxrt_result lxrt_memory_bytes(const void *data, size_t size, size_t *out_bytes)
@@ -256,7 +317,7 @@ lxrt_result lxrt_memory_bytes(const void *data, size_t size, size_t *out_bytes)
     lxrt_pack pack;
     if (!out_bytes) return LXRT_ERROR_INVALID_ARGUMENT;
     const lxrt_result result = read_pack(data, size, &pack);
-    if (result == LXRT_OK) *out_bytes = memory_needed(&pack);
+    if (result == LXRT_OK) *out_bytes = lay_out_memory(&pack).total;
     return result;
 }
 
@@ -266,16 +327,22 @@ lxrt_result lxrt_open(const void *data, size_t size, void *memory, size_t memory
     if (!memory || !out_pack) return LXRT_ERROR_INVALID_ARGUMENT;
     const lxrt_result result = read_pack(data, size, &local);
     if (result != LXRT_OK) return result;
-    if (memory_bytes < memory_needed(&local)) return LXRT_ERROR_MEMORY_TOO_SMALL;
+    const memory_layout layout = lay_out_memory(&local);
+    if (memory_bytes < layout.total) return LXRT_ERROR_MEMORY_TOO_SMALL;
 
     const size_t misaligned = (uintptr_t)memory % memory_alignment;
     unsigned char *aligned = (unsigned char *)memory + (misaligned ? memory_alignment - misaligned : 0);
     lxrt_pack *pack = (lxrt_pack *)(void *)aligned;
     *pack = local;
-    pack->handle_bytes = memory_needed(&local);
+    pack->handle_bytes = layout.total;
     pack->kernel = lxrt_best_kernel();
-    pack->colors = (lxrt_color *)(void *)(aligned + sizeof *pack);
+    pack->colors = (lxrt_color *)(void *)(aligned + layout.colors);
+    pack->drivers = (lxrt_driver *)(void *)(aligned + layout.drivers);
+    pack->animation_states = (lxrt_animation_state *)(void *)(aligned + layout.animation_states);
+    pack->monitor_states = (lxrt_monitor_state *)(void *)(aligned + layout.monitor_states);
     for (uint32_t i = 0; i < pack->layer_count; ++i) read_authored_color(lxrt_element(&pack->layers, i), &pack->colors[i]);
+    lxrt_begin_drivers(pack);
+    lxrt_begin_monitors(pack);
     *out_pack = pack;
     return LXRT_OK;
 }
@@ -289,6 +356,8 @@ void lxrt_get_info(const lxrt_pack *pack, lxrt_info *out)
         .level_count = pack->level_count,
         .rect_count = pack->rects.count,
         .source_count = pack->sources.count,
+        .animation_count = pack->animations.count,
+        .monitor_count = pack->monitors.count,
         .block_count = pack->block_count,
     };
 }
@@ -303,7 +372,7 @@ lxrt_result lxrt_get_layer_info(const lxrt_pack *pack, uint32_t layer, lxrt_laye
     if (layer >= pack->layer_count) return LXRT_ERROR_NOT_FOUND;
     const unsigned char *data = lxrt_element(&pack->layers, layer);
     *out = (lxrt_layer){
-        .name = name_of(pack, data),
+        .name = lxrt_name(pack, data),
         .kind = (lxrt_kind)lxrt_load_u32(data + 28),
         .mixed = lxrt_load_u32(data + 32),
         .color = {lxrt_load_f32(data + 8), lxrt_load_f32(data + 12), lxrt_load_f32(data + 16)},
@@ -316,7 +385,7 @@ lxrt_result lxrt_get_layer_info(const lxrt_pack *pack, uint32_t layer, lxrt_laye
 uint32_t lxrt_find_layer(const lxrt_pack *pack, const char *name)
 {
     for (uint32_t i = 0; i < pack->layer_count; ++i)
-        if (strcmp(name_of(pack, lxrt_element(&pack->layers, i)), name) == 0) return i;
+        if (strcmp(lxrt_name(pack, lxrt_element(&pack->layers, i)), name) == 0) return i;
     return LXRT_NONE;
 }
 
@@ -382,7 +451,7 @@ lxrt_result lxrt_get_source(const lxrt_pack *pack, uint32_t index, lxrt_source *
     if (index >= pack->sources.count) return LXRT_ERROR_NOT_FOUND;
     const unsigned char *data = lxrt_element(&pack->sources, index);
     *out = (lxrt_source){
-        .name = name_of(pack, data),
+        .name = lxrt_name(pack, data),
         .layer = lxrt_load_u32(data + 8),
         .kind = (lxrt_kind)lxrt_load_u32(data + 12),
         .weight = {lxrt_load_f32(data + 16), lxrt_load_f32(data + 20), lxrt_load_f32(data + 24)},

@@ -13,6 +13,9 @@ enum {
     lxrt_max_levels = 15, // 16384 texels and their mips
 };
 
+// The largest factor a texel is multiplied by: sums of a million layers at that and at 65408 stay finite.
+#define LXRT_MAX_FACTOR 1e27f
+
 // A table: elements of at least the size we know, `stride` apart.
 typedef struct lxrt_table {
     const unsigned char *data;
@@ -25,14 +28,23 @@ typedef struct lxrt_color {
     float factor[3];
 } lxrt_color;
 
+struct lxrt_driver;
+struct lxrt_animation_state;
+struct lxrt_monitor_state;
+struct lxrt_pixel_block;
+
 struct lxrt_pack {
     uint32_t page_size, page_count, layer_count, level_count;
-    lxrt_table pages, layers, strings, rects, sources;
+    lxrt_table pages, layers, strings, rects, sources, monitors, animations, animation_keys;
     const unsigned char *block_index;
     const unsigned char *blocks;
     uint32_t block_count;
     uint32_t level_first[lxrt_max_levels + 1]; // of a layer's page: where each level's entries begin; the last is their number
     lxrt_color *colors;                        // [layer_count]
+    struct lxrt_driver *drivers;               // [layer_count], rt_drive.h
+    struct lxrt_animation_state *animation_states; // [animations.count], rt_drive.h
+    struct lxrt_monitor_state *monitor_states; // [monitors.count], rt_monitor.h
+    void (*pixel_sum)(const struct lxrt_pixel_block *block, uint64_t sums[3]); // for this processor, rt_pixels.h
     uint64_t file_bytes;
     size_t handle_bytes;
     lxrt_kernel kernel; // of the composer
@@ -60,6 +72,12 @@ static inline float lxrt_load_f32(const unsigned char *p)
 static inline const unsigned char *lxrt_element(const lxrt_table *table, uint32_t index)
 {
     return table->data + (size_t)index * table->stride;
+}
+
+// The text that a name in a table, an offset into the strings and a length, refers to.
+static inline const char *lxrt_name(const lxrt_pack *pack, const unsigned char *reference)
+{
+    return (const char *)pack->strings.data + lxrt_load_u32(reference);
 }
 
 static inline uint32_t lxrt_level_size(const lxrt_pack *pack, uint32_t level)

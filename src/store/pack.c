@@ -19,18 +19,26 @@ enum {
     layer_bytes = 48,
     rect_bytes = 48,
     source_bytes = 40,
+    monitor_bytes = 48,
+    animation_bytes = 80,
     section_alignment = 64,
     block_alignment = 4096,
-    section_count = 7,
+    section_count = 10,
     max_page_size = 16384,
     max_page_count = 65536,
     max_layer_count = 1 << 20,
+    max_monitor_edge = 4096,
 };
 
 // The format's numbers are those of our enums.
 _Static_assert(LX_SOURCE_POINT == 0 && LX_SOURCE_SPOT == 1 && LX_SOURCE_DIRECTIONAL == 2 && LX_SOURCE_RECT == 3 &&
                    LX_SOURCE_DISK == 4 && LX_SOURCE_EMISSIVE == 5 && LX_SOURCE_SKY == 6 && LX_MODE_BAKED == 0 && LX_MODE_MIXED == 1,
                "kinds and modes are stored as they are");
+_Static_assert(LX_PACK_CHANNEL_WHOLE == 0 && LX_PACK_CHANNEL_COLOR == 1 && LX_PACK_CHANNEL_INTENSITY == 2 &&
+                   LXRT_PROGRAM_CONSTANT == 0 && LXRT_PROGRAM_KEYS == 1 && LXRT_PROGRAM_BLINK == 2 && LXRT_PROGRAM_FLICKER == 3 &&
+                   LXRT_PROGRAM_PULSE == 4 && LXRT_PROGRAM_WHEEL == 5 && LXRT_PROGRAM_SCHEDULE == 6 && LXRT_STEP == 0 &&
+                   LXRT_LINEAR == 1 && LXRT_CUBIC == 2,
+               "channels, programs and interpolations are stored as they are");
 
 typedef struct layer_coding {
     float inverse_scale; // a power of two too: exact
@@ -93,6 +101,78 @@ static size_t align(size_t offset, size_t alignment)
     return (offset + alignment - 1) / alignment * alignment;
 }
 
+static bool has_keys(const lxrt_program *program)
+{
+    return program->kind == LXRT_PROGRAM_KEYS || program->kind == LXRT_PROGRAM_SCHEDULE;
+}
+
+// Numbers of a key: its time and its value, with cubic interpolation two tangents more.
+static uint32_t key_stride(const lx_pack_animation *animation)
+{
+    const uint32_t width = animation->channel == LX_PACK_CHANNEL_INTENSITY ? 1 : 3;
+    const bool cubic = animation->program.kind == LXRT_PROGRAM_KEYS && animation->program.interpolation == LXRT_CUBIC;
+    return 1 + width * (cubic ? 3 : 1);
+}
+
+static uint64_t key_numbers(const lx_pack_animation *animation)
+{
+    return has_keys(&animation->program) ? (uint64_t)animation->program.key_count * key_stride(animation) : 0;
+}
+
+// What is wrong with an animation; NULL if nothing is.
+static const char *animation_problem(const lx_pack_animation *animation)
+{
+    lxrt_program program = animation->program;
+    float unused[3];
+    const bool keyed = has_keys(&program);
+    if ((uint32_t)animation->channel > LX_PACK_CHANNEL_INTENSITY) return "no such channel";
+    if (animation->channel != LX_PACK_CHANNEL_WHOLE && program.kind != LXRT_PROGRAM_KEYS)
+        return "only keys drive a colour or an intensity alone";
+    if (program.interpolation == LXRT_CUBIC && program.kind != LXRT_PROGRAM_KEYS) return "only keys are cubic";
+    if (keyed && (!program.keys || program.key_count == 0)) return "no keys";
+    for (uint64_t i = 0; i < key_numbers(animation); ++i)
+        if (!isfinite(program.keys[i])) return "a key is not finite";
+    for (uint32_t i = 1; keyed && i < program.key_count; ++i)
+        if (program.keys[(size_t)i * key_stride(animation)] < program.keys[(size_t)(i - 1) * key_stride(animation)])
+            return "keys are not in the order of their times";
+    if (animation->channel == LX_PACK_CHANNEL_INTENSITY) program.kind = LXRT_PROGRAM_CONSTANT; // its keys are no colours
+    if (lxrt_program_evaluate(&program, 0, unused) != LXRT_OK)
+        return "a number of its program is out of range (period > 0, 0 <= duty <= 1, fade >= 0; a schedule's keys within its period)";
+    return NULL;
+}
+
+static lx_result check_animations(const lx_pack_desc *desc, lx_error *error)
+{
+    for (uint32_t i = 0; i < desc->animation_count; ++i) {
+        const lx_pack_animation *animation = &desc->animations[i];
+        if (animation->layer >= desc->layer_count)
+            return lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "luxel.pack: animation %u: no layer %u", i, animation->layer);
+        const char *problem = animation_problem(animation);
+        if (problem)
+            return lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "luxel.pack: animation '%s' of layer %s: %s", animation->name,
+                           desc->layers[animation->layer].name, problem);
+    }
+    return LX_OK;
+}
+
+static lx_result check_monitors(const lx_pack_desc *desc, lx_error *error)
+{
+    for (uint32_t i = 0; i < desc->monitor_count; ++i) {
+        const lx_pack_monitor *monitor = &desc->monitors[i];
+        if (monitor->columns < 1 || monitor->columns > max_monitor_edge || monitor->rows < 1 || monitor->rows > max_monitor_edge)
+            return lx_fail(error, LX_ERROR_LIMIT, "luxel.pack: monitor %s: %u x %u cells are not possible", monitor->name, monitor->columns,
+                           monitor->rows);
+        if ((uint64_t)monitor->first_layer + monitor->columns * monitor->rows > desc->layer_count)
+            return lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "luxel.pack: monitor %s: %u x %u cells from layer %u on, but %u layers",
+                           monitor->name, monitor->columns, monitor->rows, monitor->first_layer, desc->layer_count);
+        for (int k = 0; k < 3; ++k)
+            if (!(monitor->strength[k] >= 0 && monitor->strength[k] <= 1e27f))
+                return lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "luxel.pack: monitor %s: strength %g is not possible", monitor->name,
+                               (double)monitor->strength[k]);
+    }
+    return LX_OK;
+}
+
 static lx_result check_desc(const lx_pack_desc *desc, lx_error *error)
 {
     if (desc->page_size < 1 || desc->page_size > max_page_size || desc->page_count > max_page_count ||
@@ -104,7 +184,8 @@ static lx_result check_desc(const lx_pack_desc *desc, lx_error *error)
         if (desc->sources[i].layer >= desc->layer_count)
             return lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "luxel.pack: source %s: no layer %u", desc->sources[i].name,
                            desc->sources[i].layer);
-    return LX_OK;
+    lx_result result = check_monitors(desc, error);
+    return result == LX_OK ? check_animations(desc, error) : result;
 }
 
 static int compare_rects(const void *a, const void *b)
@@ -119,15 +200,28 @@ typedef struct file_layout {
     size_t offsets[section_count], bytes[section_count], total;
 } file_layout;
 
-enum { section_page, section_layer, section_rect, section_source, section_strings, section_index, section_blocks };
+enum {
+    section_page,
+    section_layer,
+    section_rect,
+    section_source,
+    section_monitor,
+    section_animation,
+    section_key,
+    section_strings,
+    section_index,
+    section_blocks
+};
 
 static const struct {
     const char *type;
     uint32_t stride;
 } sections[section_count] = {
-    [section_page] = {"PAGE", page_bytes},     [section_layer] = {"LAYR", layer_bytes}, [section_rect] = {"RECT", rect_bytes},
-    [section_source] = {"SRCE", source_bytes}, [section_strings] = {"STRS", 1},         [section_index] = {"BIDX", 4},
-    [section_blocks] = {"BLKS", block_bytes},
+    [section_page] = {"PAGE", page_bytes},           [section_layer] = {"LAYR", layer_bytes},
+    [section_rect] = {"RECT", rect_bytes},           [section_source] = {"SRCE", source_bytes},
+    [section_monitor] = {"MONI", monitor_bytes},     [section_animation] = {"ANIM", animation_bytes},
+    [section_key] = {"AKEY", 4},                     [section_strings] = {"STRS", 1},
+    [section_index] = {"BIDX", 4},                   [section_blocks] = {"BLKS", block_bytes},
 };
 
 static lx_result plan(const lx_pack_desc *desc, uint32_t entries_per_image_set, file_layout *out, lx_error *error)
@@ -135,11 +229,20 @@ static lx_result plan(const lx_pack_desc *desc, uint32_t entries_per_image_set, 
     uint64_t text_bytes = 1;
     for (uint32_t i = 0; i < desc->layer_count; ++i) text_bytes += strlen(desc->layers[i].name) + 1;
     for (uint32_t i = 0; i < desc->source_count; ++i) text_bytes += strlen(desc->sources[i].name) + 1;
+    for (uint32_t i = 0; i < desc->monitor_count; ++i) text_bytes += strlen(desc->monitors[i].name) + 1;
+    uint64_t key_count = 0;
+    for (uint32_t i = 0; i < desc->animation_count; ++i) {
+        text_bytes += strlen(desc->animations[i].name) + 1;
+        key_count += key_numbers(&desc->animations[i]);
+    }
     const uint64_t counts[section_count] = {
         [section_page] = desc->page_count,
         [section_layer] = desc->layer_count,
         [section_rect] = desc->rect_count,
         [section_source] = desc->source_count,
+        [section_monitor] = desc->monitor_count,
+        [section_animation] = desc->animation_count,
+        [section_key] = key_count,
         [section_strings] = text_bytes,
         [section_index] = (uint64_t)desc->page_count * desc->layer_count * entries_per_image_set,
     };
@@ -192,6 +295,47 @@ static void write_name(const char *name, uint8_t *strings, size_t *used, uint8_t
     *used += length + 1;
 }
 
+static void write_monitors(const lx_pack_desc *desc, uint8_t *monitors, uint8_t *strings, size_t *used)
+{
+    for (uint32_t i = 0; i < desc->monitor_count; ++i) {
+        const lx_pack_monitor *from = &desc->monitors[i];
+        uint8_t *monitor = monitors + (size_t)i * monitor_bytes;
+        write_name(from->name, strings, used, monitor);
+        store_u32(monitor + 8, from->node);
+        store_u32(monitor + 12, (uint32_t)from->material);
+        store_u32(monitor + 16, from->columns);
+        store_u32(monitor + 20, from->rows);
+        store_u32(monitor + 24, from->first_layer);
+        for (int k = 0; k < 3; ++k) store_f32(monitor + 28 + 4 * k, from->strength[k]);
+    }
+}
+
+static void write_animations(const lx_pack_desc *desc, uint8_t *animations, uint8_t *keys, uint8_t *strings, size_t *used)
+{
+    size_t first_key = 0;
+    for (uint32_t i = 0; i < desc->animation_count; ++i) {
+        const lx_pack_animation *from = &desc->animations[i];
+        const lxrt_program *program = &from->program;
+        const size_t numbers = (size_t)key_numbers(from);
+        uint8_t *animation = animations + (size_t)i * animation_bytes;
+        write_name(from->name, strings, used, animation);
+        store_u32(animation + 8, from->layer);
+        store_u32(animation + 12, program->kind);
+        store_u32(animation + 16, from->channel);
+        store_u32(animation + 20, program->interpolation);
+        store_u32(animation + 24, (uint32_t)first_key);
+        store_u32(animation + 28, numbers > 0 ? program->key_count : 0);
+        for (int k = 0; k < 3; ++k) store_f32(animation + 32 + 4 * k, program->color[k]);
+        const float floats[] = {program->intensity, program->period_s, program->phase_s, program->duty,
+                                program->low,       program->high,     program->fade_s};
+        for (int k = 0; k < 7; ++k) store_f32(animation + 44 + 4 * k, floats[k]);
+        store_u32(animation + 72, program->seed);
+        store_u32(animation + 76, program->loop != 0);
+        for (size_t k = 0; k < numbers; ++k) store_f32(keys + 4 * (first_key + k), program->keys[k]);
+        first_key += numbers;
+    }
+}
+
 static void write_tables(const lx_pack_desc *desc, const file_layout *layout, const lx_pack_rect *sorted_rects, uint8_t *data)
 {
     uint8_t *strings = data + layout->offsets[section_strings];
@@ -233,6 +377,8 @@ static void write_tables(const lx_pack_desc *desc, const file_layout *layout, co
         store_u32(source + 28, from->node);
         store_u32(source + 32, (uint32_t)from->material);
     }
+    write_monitors(desc, data + layout->offsets[section_monitor], strings, &used);
+    write_animations(desc, data + layout->offsets[section_animation], data + layout->offsets[section_key], strings, &used);
 }
 
 static lx_result writer_create(const lx_pack_desc *desc, lx_pack_writer **out, lx_error *error)

@@ -3,6 +3,7 @@
 #define LX_STORE_PACK_H
 
 #include "base/file.h"
+#include "luxel_rt.h"
 #include "scene/scene.h"
 
 enum { lx_pack_kind_combined = LX_SOURCE_SKY + 1 }; ///< A layer of all sources at their authored colours.
@@ -33,6 +34,32 @@ typedef struct lx_pack_rect {
     float scale[2], offset[2];
 } lx_pack_rect;
 
+typedef struct lx_pack_monitor {
+    const char *name;
+    uint32_t node;    ///< In the file.
+    int32_t material; ///< In the file; -1: none.
+    uint32_t columns, rows;
+    uint32_t first_layer; ///< Of cell 0; the others follow row by row.
+    float strength[3];    ///< Radiance (nit) of a white pixel.
+} lx_pack_monitor;
+
+/// What an animation's values are.
+typedef enum lx_pack_channel {
+    LX_PACK_CHANNEL_WHOLE,     ///< c itself: colour × intensity.
+    LX_PACK_CHANNEL_COLOR,     ///< The colour, with the layer's authored intensity. Of LXRT_PROGRAM_KEYS alone.
+    LX_PACK_CHANNEL_INTENSITY, ///< The intensity, with the layer's authored colour. Of LXRT_PROGRAM_KEYS alone.
+} lx_pack_channel;
+
+typedef struct lx_pack_animation {
+    const char *name; ///< "" for `luxel_animate`.
+    uint32_t layer;
+    lx_pack_channel channel;
+    /// Start from lxrt_program_default: every field must make sense, also those that the kind has no use for. With
+    /// LX_PACK_CHANNEL_INTENSITY a value in `keys` is one number instead of three: {time_s, value}, or with LXRT_CUBIC
+    /// {time_s, in-tangent, value, out-tangent}.
+    lxrt_program program;
+} lx_pack_animation;
+
 /// Everything but the texels. Arrays are borrowed during lx_pack_begin alone.
 typedef struct lx_pack_desc {
     uint32_t page_size, page_count, level_count;
@@ -43,6 +70,10 @@ typedef struct lx_pack_desc {
     uint32_t source_count;
     const lx_pack_rect *rects; ///< In any order, but no (node, gpu_instance) twice.
     uint32_t rect_count;
+    const lx_pack_monitor *monitors;
+    uint32_t monitor_count;
+    const lx_pack_animation *animations; ///< Where several play at once on a layer the last wins.
+    uint32_t animation_count;
 } lx_pack_desc;
 
 typedef struct lx_pack_stats {
