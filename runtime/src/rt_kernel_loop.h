@@ -87,10 +87,10 @@ SIMD static inline void run(const lxrt_job *job, const lxrt_format format, const
             const size_t at = 4 * (size_t)(32 * y + x), sums_at = (size_t)lxrt_row_floats * y + x;
             sums s;
             for (int i = 0; i < 2; ++i) {
-                const float *from = job->from + sums_at + lanes * i;
-                s.r[i] = job->from ? f_load(from) : f_set1(0);
-                s.g[i] = job->from ? f_load(from + lxrt_plane_floats) : f_set1(0);
-                s.b[i] = job->from ? f_load(from + 2 * lxrt_plane_floats) : f_set1(0);
+                const float *from = job->from ? job->from + sums_at + lanes * i : NULL;
+                s.r[i] = from ? f_load(from) : f_set1(0);
+                s.g[i] = from ? f_load(from + lxrt_plane_floats) : f_set1(0);
+                s.b[i] = from ? f_load(from + 2 * lxrt_plane_floats) : f_set1(0);
             }
             for (uint32_t k = 0; k < group->count; ++k) {
                 const unsigned char *words = group->blocks[k] + at;
