@@ -3,9 +3,8 @@
 #include "base/clock.h"
 #include "base/error.h"
 #include "luxel_rt.h"
+#include "rt_pixels.h"
 #include "store/pack.h"
-
-#include "../runtime/src/rt_pixels.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -41,13 +41,13 @@ struct lxrt_pack {
     uint32_t block_count;
     uint32_t level_first[lxrt_max_levels + 1]; // of a layer's page: where each level's entries begin; the last is their number
     lxrt_color *colors;                        // [layer_count]
-    uint64_t file_bytes;
-    size_t handle_bytes;
-    lxrt_kernel kernel; // of the composer
     struct lxrt_driver *drivers;               // [layer_count], rt_drive.h
     struct lxrt_animation_state *animation_states; // [animations.count], rt_drive.h
     struct lxrt_monitor_state *monitor_states; // [monitors.count], rt_monitor.h
     void (*pixel_sum)(const struct lxrt_pixel_block *block, uint64_t sums[3]); // for this processor, rt_pixels.h
+    uint64_t file_bytes;
+    size_t handle_bytes;
+    lxrt_kernel kernel; // of the composer
 };
 
 // Little-endian numbers at any address. Compilers turn these into plain loads.

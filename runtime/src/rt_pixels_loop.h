@@ -13,6 +13,7 @@
 //     v_sum8           sums of bytes as 32 bits: those of the lower and of the upper half of each lane stay apart
 //     v_low32, v_high32, v_low64  lower or upper halves of lanes, interleaved by 4 bytes or one after the other
 //     v_store          to 4-byte numbers
+//     v_prefetch       will be read soon
 #include "rt_pixels.h"
 
 typedef struct tables {
@@ -73,6 +74,7 @@ SIMD static inline void add_halves(const half_sums *sums, int64_t out[2])
 SIMD void KERNEL(const lxrt_pixel_block *block, uint64_t sums[3])
 {
     enum { group = width / 4 }; // pixels of a register
+    enum { rows_ahead = 4 };
     const uint32_t pixel_bytes = block->pixel_bytes;
     // Three bytes: the last pixels of a row are left to the scalar kernel, so that nothing behind it is read.
     const uint32_t readable = pixel_bytes == 4 ? block->width : block->width < 2 ? 0 : block->width - 2;
@@ -84,11 +86,16 @@ SIMD void KERNEL(const lxrt_pixel_block *block, uint64_t sums[3])
         half_sums red_green = {zero, zero, zero, zero}, blue = red_green;
         for (uint32_t y = 0; y < block->rows; ++y) {
             const unsigned char *p = block->pixels + y * block->stride;
+            // Rows of a cell are short and far apart: the processor does not guess the next ones by itself.
+            const size_t ahead = y + rows_ahead < block->rows ? rows_ahead * block->stride : 0;
             uint32_t x = 0;
             // Values of 0 add 0: registers without pixels are simply that.
 #define PIXELS(load, bytes)                                                                                                         \
-    for (; x + 4 * group <= wide; x += 4 * group, p += 4 * group * bytes)                                                           \
+    for (; x + 4 * group <= wide; x += 4 * group, p += 4 * group * bytes) {                                                         \
+        v_prefetch(p + ahead);                                                                                                      \
+        v_prefetch(p + ahead + 2 * group * bytes);                                                                                  \
         add_pixels(&t, load(p), load(p + group * bytes), load(p + 2 * group * bytes), load(p + 3 * group * bytes), &red_green, &blue); \
+    }                                                                                                                               \
     if (x < wide)                                                                                                                   \
         add_pixels(&t, load(p), x + group < wide ? load(p + group * bytes) : zero,                                                  \
                    x + 2 * group < wide ? load(p + 2 * group * bytes) : zero, zero, &red_green, &blue);

@@ -25,6 +25,7 @@ typedef __m128i vbytes;
 #define v_low32(a, b) _mm_unpacklo_epi32(a, b)
 #define v_high32(a, b) _mm_unpackhi_epi32(a, b)
 #define v_low64(a, b) _mm_unpacklo_epi64(a, b)
+#define v_prefetch(p) _mm_prefetch((const char *)(p), _MM_HINT_T0)
 
 SIMD static inline vbytes v_table(const uint8_t bytes[16])
 {

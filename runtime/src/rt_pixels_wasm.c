@@ -27,6 +27,7 @@ typedef v128_t vbytes;
 #define v_load4(p) wasm_i8x16_swizzle(wasm_v128_load(p), wasm_i8x16_make(0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, -1, -1, -1, -1))
 #define v_load3(p) wasm_i8x16_swizzle(wasm_v128_load(p), wasm_i8x16_make(0, 3, 6, 9, 1, 4, 7, 10, 2, 5, 8, 11, -1, -1, -1, -1))
 #define v_store(out, v) wasm_v128_store(out, v)
+#define v_prefetch(p) ((void)(p))
 
 static inline vbytes v_dot8(vbytes a, vbytes b)
 {

@@ -360,19 +360,31 @@ lx_result lx_baked_compose(const lx_baked *baked, uint32_t page, float *out_rgb,
     return rt == LXRT_OK ? LX_OK : lx_fail(error, LX_ERROR_BACKEND, "%s: page %u: %s", baked->folder, page, lxrt_result_name(rt));
 }
 
+void lx_baked_get_budget(const lx_baked *baked, lx_budget *out)
+{
+    lxrt_budget budget;
+    lxrt_get_budget(baked->pack, &budget);
+    *out = (lx_budget){
+        .ram = budget.pack_bytes + budget.handle_bytes,
+        .accumulator = budget.accumulator_bytes,
+        .gpu_composed = budget.gpu_composed_bytes,
+        .gpu_layers = budget.gpu_layers_bytes,
+        .dense = budget.dense_bytes,
+    };
+}
+
 static uint64_t file_bytes(const lx_baked *baked, const char *name)
 {
     char *path = name ? lx_path_join(baked->folder, name) : NULL;
-    FILE *file = path ? fopen(path, "rb") : NULL;
-    const long size = file && fseek(file, 0, SEEK_END) == 0 ? ftell(file) : -1;
-    if (file) fclose(file);
+    const uint64_t bytes = path ? lx_file_bytes(path) : 0;
     lx_free(path);
-    return size > 0 ? (uint64_t)size : 0;
+    return bytes;
 }
 
 lx_result lx_baked_describe(const lx_baked *baked, char **out_json, lx_error *error)
 {
-    const lx_manifest *manifest = &baked->manifest;
+    lx_manifest copy = baked->manifest, *manifest = &copy; // shallow
+    lx_baked_get_budget(baked, &copy.memory);
     uint64_t *sizes = lx_calloc_array((size_t)manifest->file_count + 2, sizeof *sizes);
     if (!sizes) return lx_fail_memory(error, "description");
     sizes[0] = file_bytes(baked, manifest->scene);

@@ -144,6 +144,7 @@ static lx_result describe(const lx_bake *bake, lx_manifest *manifest, lx_error *
             .seed = bake->desc.transport.seed,
             .isa = bake->tracer ? lx_tracer_isa(bake->tracer) : "",
             .seconds = bake->summary.seconds,
+            .stages = bake->summary.stages,
             .threads = bake->scene->context ? lx_pool_worker_count(bake->scene->context->pool) : 0,
         },
     };

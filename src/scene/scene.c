@@ -1,6 +1,7 @@
 // Loading scenes from disk and letting go of them.
 #include "scene/scene.h"
 
+#include "base/clock.h"
 #include "base/error.h"
 #include "scene/geometry.h"
 #include "scene/gltf.h"
@@ -17,6 +18,7 @@ lx_result lx_scene_load(lx_context *context, const char *path, const lx_scene_lo
     if (!desc) desc = &defaults;
     lx_bytes file = {0};
     char *folder = NULL;
+    const double start = lx_seconds();
     lx_result result = lx_file_read(path, desc->max_file_bytes, &file, error);
     if (result != LX_OK) {
         lx_error_prefix(error, "%s", path);
@@ -25,6 +27,7 @@ lx_result lx_scene_load(lx_context *context, const char *path, const lx_scene_lo
     folder = lx_path_folder(path);
     result = folder ? lx_gltf_import(context, path, folder, file.data, file.size, desc, out_scene, error)
                     : lx_fail_memory(error, "path");
+    if (result == LX_OK) (*out_scene)->import_seconds = lx_seconds() - start;
     lx_free(folder);
     lx_bytes_release(&file);
     return result;

@@ -202,6 +202,7 @@ struct lx_scene {
 
     lx_bounds bounds;         ///< Of all static instances, world.
     uint64_t triangle_count;  ///< Of all static instances.
+    double import_seconds;    ///< What lx_scene_load took.
     bool from_blender;        ///< asset.generator names Blender's exporter.
 
     // The file, for export.

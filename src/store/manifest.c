@@ -169,6 +169,45 @@ static json_t *write_sky(const lx_manifest_sky *sky)
     return NULL;
 }
 
+static const struct {
+    const char *key;
+    size_t offset;
+} stage_fields[] = {
+    {"import", offsetof(lx_stage_seconds, import)}, {"unwrap", offsetof(lx_stage_seconds, unwrap)},
+    {"luxels", offsetof(lx_stage_seconds, luxels)}, {"bake", offsetof(lx_stage_seconds, bake)},
+    {"post", offsetof(lx_stage_seconds, post)},     {"save", offsetof(lx_stage_seconds, save)},
+    {"preview", offsetof(lx_stage_seconds, preview)},
+};
+
+static double *stage_field(lx_stage_seconds *stages, size_t index)
+{
+    return (double *)((char *)stages + stage_fields[index].offset);
+}
+
+static json_t *write_stages(lx_stage_seconds stages)
+{
+    json_t *object = json_object();
+    bool ok = object != NULL;
+    for (size_t i = 0; i < sizeof stage_fields / sizeof *stage_fields; ++i)
+        ok = ok && put(object, stage_fields[i].key, real(*stage_field(&stages, i)));
+    if (ok) return object;
+    json_decref(object);
+    return NULL;
+}
+
+static json_t *write_memory(const lx_budget *memory)
+{
+    json_t *object = json_object();
+    if (put(object, "ram", json_integer((json_int_t)memory->ram)) &&
+        put(object, "accumulator", json_integer((json_int_t)memory->accumulator)) &&
+        put(object, "gpu_composed", json_integer((json_int_t)memory->gpu_composed)) &&
+        put(object, "gpu_layers", json_integer((json_int_t)memory->gpu_layers)) &&
+        put(object, "dense", json_integer((json_int_t)memory->dense)))
+        return object;
+    json_decref(object);
+    return NULL;
+}
+
 static json_t *write_bake(const lx_manifest_bake *bake)
 {
     json_t *object = json_object();
@@ -176,6 +215,7 @@ static json_t *write_bake(const lx_manifest_bake *bake)
         put(object, "bounces", bake->bounces == LX_BOUNCES_INF ? json_string("inf") : json_integer(bake->bounces)) &&
         put(object, "integrator", text(bake->integrator)) && put(object, "seed", json_integer(bake->seed)) &&
         put(object, "isa", text(bake->isa)) && put(object, "seconds", real(bake->seconds)) &&
+        put(object, "stages", write_stages(bake->stages)) &&
         put(object, "threads", json_integer(bake->threads)))
         return object;
     json_decref(object);
@@ -234,7 +274,8 @@ lx_result lx_manifest_write(const lx_manifest *manifest, const uint64_t *sizes, 
         put(root, "monitors", write_array(manifest, manifest->monitor_count, write_monitor)) &&
         put(root, "animations", write_array(manifest, manifest->animation_count, write_animation)) &&
         (!manifest->has_sky || put(root, "sky", write_sky(&manifest->sky))) &&
-        (!manifest->has_view || put(root, "view", write_view(manifest))) && put(root, "bake", write_bake(&manifest->bake)) &&
+        (!manifest->has_view || put(root, "view", write_view(manifest))) &&
+        (!manifest->memory.ram || put(root, "memory", write_memory(&manifest->memory))) && put(root, "bake", write_bake(&manifest->bake)) &&
         put(root, "hashes", write_hashes(manifest)) && (!sizes || put(root, "sizes", write_sizes(manifest, sizes)));
     if (complete) dump = json_dumps(root, JSON_INDENT(2) | JSON_REAL_PRECISION(9)); // 9 digits hold every float
     char *copy = dump ? lx_format("%s\n", dump) : NULL;
@@ -245,6 +286,24 @@ lx_result lx_manifest_write(const lx_manifest *manifest, const uint64_t *sizes, 
     free(dump);
     json_decref(root);
     return result;
+}
+
+lx_result lx_manifest_drop_files(const char *text_data, size_t size, char **out_text, lx_error *error)
+{
+    json_error_t problem;
+    json_t *root = json_loadb(text_data, size, JSON_REJECT_DUPLICATES, &problem);
+    if (!root) return lx_fail(error, LX_ERROR_FORMAT, "line %d: %s", problem.line, problem.text);
+    json_t *layer;
+    size_t index;
+    json_object_set_new(root, "files", json_array());
+    json_array_foreach(json_object_get(root, "layers"), index, layer) json_object_del(layer, "scale"); // of KTX2 files alone
+    char *dump = json_dumps(root, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
+    char *copy = dump ? lx_format("%s\n", dump) : NULL;
+    free(dump);
+    json_decref(root);
+    if (!copy) return lx_fail_memory(error, "luxel.json");
+    *out_text = copy;
+    return LX_OK;
 }
 
 // ---- reading: every getter names what is wrong, relative to `where`
@@ -509,6 +568,12 @@ static lx_result read_bake(const reader *r, const json_t *root)
     LX_TRY(get_text(r, object, "bake", "isa", "", &bake->isa));
     LX_TRY(get_float(r, object, "bake", "seconds", false, &seconds));
     bake->seconds = (double)seconds;
+    const json_t *stages = json_object_get(object, "stages");
+    for (size_t i = 0; i < sizeof stage_fields / sizeof *stage_fields; ++i) {
+        float stage = 0;
+        LX_TRY(get_float(r, stages, "bake.stages", stage_fields[i].key, false, &stage));
+        *stage_field(&bake->stages, i) = (double)stage;
+    }
     LX_TRY(get_uint(r, object, "bake", "threads", false, &bake->threads));
 cleanup:
     return result;

@@ -352,6 +352,134 @@ static void pack_without_pages_or_layers_opens(void **state)
     lx_bytes_release(&bytes);
 }
 
+static const float cubic_intensities[] = {0, 1, 2, 3, 4, 5, 6, 7}, color_keys[] = {0.5f, 1, 0, 0, 2, 0, 1, 0, 2.5f, 0, 0, 1};
+
+static lxrt_program keyed(lxrt_program_kind kind, const float *keys, uint32_t count, lxrt_interpolation interpolation)
+{
+    lxrt_program program = lxrt_program_default();
+    program.kind = kind;
+    program.keys = keys;
+    program.key_count = count;
+    program.interpolation = interpolation;
+    return program;
+}
+
+static lx_result begin_driven(const lx_pack_monitor *monitors, uint32_t monitor_count, const lx_pack_animation *animations,
+                              uint32_t animation_count, lx_bytes *out, lx_error *error)
+{
+    const lx_pack_layer layers[] = {{.name = "tv", .color = {1, 1, 1}, .intensity = 1, .scale = 1},
+                                    {.name = "tv", .color = {1, 1, 1}, .intensity = 1, .scale = 1},
+                                    {.name = "lamp", .color = {1, 0.5f, 0}, .intensity = 8, .scale = 1}};
+    const lx_pack_desc desc = {.page_size = 32, .level_count = 1, .layers = layers, .layer_count = 3, .monitors = monitors,
+                               .monitor_count = monitor_count, .animations = animations, .animation_count = animation_count};
+    lx_pack_writer *writer = NULL;
+    lx_result result = lx_pack_begin(&desc, &writer, error);
+    if (result == LX_OK) result = lx_pack_finish(writer, out, NULL, error);
+    lx_pack_destroy(writer);
+    return result;
+}
+
+static void pack_monitors_and_animations_come_back(void **state)
+{
+    (void)state;
+    const lx_pack_monitor monitors[] = {{"screen", 11, 4, 2, 1, 0, {100, 200, 300}}, {"screen two", 12, -1, 1, 2, 0, {0, 0, 0}}};
+    lx_pack_animation animations[] = {
+        {"dusk", 2, LX_PACK_CHANNEL_COLOR, keyed(LXRT_PROGRAM_KEYS, color_keys, 3, LXRT_STEP)},
+        {"dusk", 2, LX_PACK_CHANNEL_INTENSITY, keyed(LXRT_PROGRAM_KEYS, cubic_intensities, 2, LXRT_CUBIC)},
+        {"", 0, LX_PACK_CHANNEL_WHOLE, lxrt_program_default()},
+        {"", 1, LX_PACK_CHANNEL_WHOLE, keyed(LXRT_PROGRAM_SCHEDULE, color_keys, 3, LXRT_LINEAR)},
+    };
+    lxrt_program *pulse = &animations[2].program;
+    *pulse = (lxrt_program){LXRT_PROGRAM_PULSE, {0.5f, 1, 0.25f}, 3, 2, 0.25f, 0.75f, 0.125f, 2, 1.5f, 99, NULL, 0, LXRT_LINEAR, 0};
+    animations[3].program.period_s = 5;
+    lx_bytes bytes = {0};
+    lx_error error = {0};
+    void *memory;
+    assert_int_equal(begin_driven(monitors, 2, animations, 4, &bytes, &error), LX_OK);
+    lxrt_pack *pack = open_pack(&bytes, &memory);
+    lxrt_info info;
+    lxrt_monitor monitor;
+    lxrt_animation animation;
+    lxrt_get_info(pack, &info);
+    assert_int_equal(info.monitor_count, 2);
+    assert_int_equal(info.animation_count, 4);
+    assert_int_equal(lxrt_get_monitor(pack, 0, &monitor), LXRT_OK);
+    assert_string_equal(monitor.name, "screen");
+    assert_int_equal(monitor.node, 11);
+    assert_int_equal(monitor.material, 4);
+    assert_int_equal(monitor.columns, 2);
+    assert_int_equal(monitor.rows, 1);
+    assert_float_equal(monitor.strength[1], 200, 0);
+    assert_int_equal(lxrt_get_monitor(pack, 1, &monitor), LXRT_OK);
+    assert_string_equal(monitor.name, "screen two");
+    assert_int_equal(monitor.material, -1);
+    assert_int_equal(lxrt_get_animation(pack, 1, &animation), LXRT_OK);
+    assert_string_equal(animation.name, "dusk");
+    assert_int_equal(animation.layer, 2);
+    assert_float_equal(animation.duration_s, 4, 0);
+    assert_int_equal(lxrt_get_animation(pack, 2, &animation), LXRT_OK);
+    assert_string_equal(animation.name, "");
+    assert_int_equal(animation.kind, LXRT_PROGRAM_PULSE);
+    assert_float_equal(animation.duration_s, 2, 0);
+    // The runtime's own programs, evaluated from the fields that were written: any field lost would show.
+    for (double t = -3; t < 9; t += 0.31) {
+        float want[3], got[3];
+        lxrt_update(pack, t);
+        assert_int_equal(lxrt_program_evaluate(pulse, t, want), LXRT_OK);
+        assert_int_equal(lxrt_get_layer(pack, 0, got), LXRT_OK);
+        assert_memory_equal(got, want, sizeof got);
+        assert_int_equal(lxrt_program_evaluate(&animations[3].program, t, want), LXRT_OK);
+        assert_int_equal(lxrt_get_layer(pack, 1, got), LXRT_OK);
+        assert_memory_equal(got, want, sizeof got);
+    }
+    float rgb[3];
+    lxrt_update(pack, 2); // green, times the spline half way from 2 (leaving with 3 per second) to 6 (arriving with 5 per second)
+    assert_int_equal(lxrt_get_layer(pack, 2, rgb), LXRT_OK);
+    assert_float_equal(rgb[0], 0, 0);
+    assert_float_equal(rgb[1], 0.5f * 2 + 0.125f * 4 * 3 + 0.5f * 6 - 0.125f * 4 * 5, 0);
+    free(memory);
+    lx_bytes_release(&bytes);
+}
+
+static void pack_refuses_monitors_and_animations_that_make_no_sense(void **state)
+{
+    (void)state;
+    static const float backward[] = {2, 0, 0, 0, 1, 0, 0, 0}, not_finite[] = {0, 0, INFINITY, 0};
+    lx_bytes bytes = {0};
+    lx_error error = {0};
+    const lx_pack_monitor monitors[] = {{"tv", 0, -1, 0, 1, 0, {1, 1, 1}},  {"tv", 0, -1, 1, 4097, 0, {1, 1, 1}},
+                                        {"tv", 0, -1, 2, 2, 0, {1, 1, 1}},  {"tv", 0, -1, 1, 1, UINT32_MAX, {1, 1, 1}},
+                                        {"tv", 0, -1, 1, 1, 0, {1, NAN, 1}}, {"tv", 0, -1, 1, 1, 0, {-1, 0, 0}}};
+    for (size_t i = 0; i < sizeof monitors / sizeof *monitors; ++i) {
+        assert_int_not_equal(begin_driven(&monitors[i], 1, NULL, 0, &bytes, &error), LX_OK);
+        assert_non_null(strstr(error.message, "monitor tv"));
+    }
+    struct {
+        lx_pack_animation animation;
+        const char *says;
+    } cases[] = {
+        {{"a", 3, LX_PACK_CHANNEL_WHOLE, lxrt_program_default()}, "no layer 3"},
+        {{"a", 2, (lx_pack_channel)3, lxrt_program_default()}, "no such channel"},
+        {{"a", 2, LX_PACK_CHANNEL_COLOR, lxrt_program_default()}, "only keys drive"},
+        {{"a", 2, LX_PACK_CHANNEL_INTENSITY, keyed(LXRT_PROGRAM_SCHEDULE, color_keys, 1, LXRT_LINEAR)}, "only keys drive"},
+        {{"a", 2, LX_PACK_CHANNEL_WHOLE, keyed(LXRT_PROGRAM_SCHEDULE, color_keys, 1, LXRT_CUBIC)}, "only keys are cubic"},
+        {{"a", 2, LX_PACK_CHANNEL_WHOLE, keyed(LXRT_PROGRAM_KEYS, color_keys, 0, LXRT_LINEAR)}, "no keys"},
+        {{"a", 2, LX_PACK_CHANNEL_WHOLE, keyed(LXRT_PROGRAM_KEYS, NULL, 1, LXRT_LINEAR)}, "no keys"},
+        {{"a", 2, LX_PACK_CHANNEL_WHOLE, keyed(LXRT_PROGRAM_KEYS, backward, 2, LXRT_LINEAR)}, "order of their times"},
+        {{"a", 2, LX_PACK_CHANNEL_INTENSITY, keyed(LXRT_PROGRAM_KEYS, backward, 3, LXRT_LINEAR)}, "order of their times"},
+        {{"a", 2, LX_PACK_CHANNEL_COLOR, keyed(LXRT_PROGRAM_KEYS, not_finite, 1, LXRT_STEP)}, "not finite"},
+        {{"a", 2, LX_PACK_CHANNEL_WHOLE, keyed((lxrt_program_kind)9, color_keys, 1, LXRT_STEP)}, "out of range"},
+        {{"a", 2, LX_PACK_CHANNEL_WHOLE, keyed(LXRT_PROGRAM_SCHEDULE, color_keys, 3, LXRT_LINEAR)}, "out of range"}, // 1 s
+        {{"a", 2, LX_PACK_CHANNEL_INTENSITY, keyed(LXRT_PROGRAM_KEYS, cubic_intensities, 1, LXRT_CUBIC)}, "out of range"},
+    };
+    cases[12].animation.program.period_s = 0;
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+        assert_int_not_equal(begin_driven(NULL, 0, &cases[i].animation, 1, &bytes, &error), LX_OK);
+        if (!strstr(error.message, cases[i].says)) fail_msg("case %zu: '%s' does not say '%s'", i, error.message, cases[i].says);
+    }
+    assert_null(bytes.data);
+}
+
 static void pack_scale_keeps_every_brightness_in_range(void **state)
 {
     (void)state;
@@ -531,6 +659,8 @@ int main(void)
         cmocka_unit_test(set_layer_refuses_numbers_that_cannot_be_summed),
         cmocka_unit_test(pack_leaves_out_blocks_below_the_threshold),
         cmocka_unit_test(pack_without_pages_or_layers_opens),
+        cmocka_unit_test(pack_monitors_and_animations_come_back),
+        cmocka_unit_test(pack_refuses_monitors_and_animations_that_make_no_sense),
         cmocka_unit_test(pack_scale_keeps_every_brightness_in_range),
         cmocka_unit_test(pack_cut_anywhere_is_refused),
         cmocka_unit_test(pack_cut_with_a_matching_header_is_refused),

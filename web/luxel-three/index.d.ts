@@ -14,8 +14,8 @@ export interface LoadOptions {
   filter?: 'bilinear' | 'bicubic';
   /** Where luxel_rt.wasm is; default: beside the package's module. */
   wasmUrl?: string | URL;
-  /** Called with 0…1 while files arrive. */
-  onProgress?: (fraction: number) => void;
+  /** Called with 0…1 and with bytes while files arrive. */
+  onProgress?: (fraction: number, loadedBytes: number, totalBytes: number) => void;
   signal?: AbortSignal;
 }
 
@@ -120,6 +120,8 @@ export interface Room {
 
   /** Composed irradiance of a page, RGB floats (for tests and tools). */
   readPage(page: number, level?: number): Float32Array;
+  /** What one layer adds to it at its colour of now, whether muted or not. */
+  readLayer(page: number, layer: string | number, level?: number): Float32Array;
   /** What is shown: lit; E/π without tone mapping; base colour alone. The viewer's view modes. */
   setView(view: 'lit' | 'lightmap' | 'albedo'): void;
 

@@ -50,7 +50,8 @@ export async function loadLuxel(renderer, url, options = {}) {
   const arrived = {};
   const report = (name, bytes) => {
     arrived[name] = bytes;
-    if (total > 0) onProgress?.(Math.min(1, Object.values(arrived).reduce((sum, value) => sum + value, 0) / total));
+    const loaded = Object.values(arrived).reduce((sum, value) => sum + value, 0);
+    if (total > 0) onProgress?.(Math.min(1, loaded / total), loaded, total);
   };
   const whole = async (name) => {
     const bytes = await responses[name].arrayBuffer();
@@ -66,7 +67,7 @@ export async function loadLuxel(renderer, url, options = {}) {
   const loadSky = async () => (manifest.sky ? Sky.load(manifest.sky.file, await whole('sky'), manifest.sky.rotation ?? 0) : null);
   const [runtime, gltf, sky] = await Promise.all([loadPack(), loadScene(), loadSky()]);
   signal?.throwIfAborted();
-  onProgress?.(1);
+  onProgress?.(1, total, total);
   return new Room(renderer, runtime, gltf, sky, manifest, options);
 }
 

@@ -123,15 +123,25 @@ const skyTint = /* glsl */ `
 #endif
 `;
 
-// In the place of tone mapping, which views of the data go without.
+// Straight through glass, tinted by it once: as `luxel render` sees it. What is behind is in three's own buffer, in this view's values.
+const throughGlass = `
+#ifdef USE_TRANSMISSION
+  vec4 luxelPlace = projectionMatrix * viewMatrix * vec4(vWorldPosition, 1.0);
+  vec3 luxelBehind = textureLod(transmissionSamplerMap, 0.5 + 0.5 * luxelPlace.xy / luxelPlace.w, 0.0).rgb;
+  gl_FragColor = vec4(mix(gl_FragColor.rgb, luxelBehind * diffuseColor.rgb, material.transmission), diffuseColor.a);
+#endif
+`;
+
+// In the place of tone mapping, which views of the data go without. Albedo is the bake's: of metal a little is left to the lightmap.
 function viewCode(lit, standard) {
   const lightmap = lit ? 'luxelIrradiance() * RECIPROCAL_PI * luxelExposure' : 'vec3(0.0)';
-  const albedo = standard ? 'diffuseColor.rgb * (1.0 - metalnessFactor)' : 'diffuseColor.rgb';
+  const albedo = standard ? 'diffuseColor.rgb * mix(1.0, 0.5 * roughnessFactor * roughnessFactor, metalnessFactor)' : 'diffuseColor.rgb';
   return `
 if (luxelView == ${VIEWS.lit}) {
   ${ShaderChunk.tonemapping_fragment}
 } else {
   gl_FragColor.rgb = luxelView == ${VIEWS.lightmap} ? ${lightmap} : ${albedo};
+  ${standard ? throughGlass : ''}
 }
 `;
 }

@@ -511,6 +511,16 @@ export class Room {
     return this.#runtime.readPage(page, level);
   }
 
+  readLayer(page, layer, level = 0) {
+    const index = this.#index(layer);
+    this.#takeFields();
+    for (const light of this.lights) this.#runtime.setColor(light.index, 0, 0, 0);
+    this.#runtime.setColor(index, ...this.#logical.subarray(3 * index, 3 * index + 3));
+    const texels = this.#runtime.readPage(page, level);
+    for (const light of this.lights) this.#runtime.setColor(light.index, ...this.#inPack.subarray(3 * light.index, 3 * light.index + 3));
+    return texels;
+  }
+
   setView(view) {
     if (!(view in VIEWS)) throw new Error(`luxel: "${view}" is no view; there are ${Object.keys(VIEWS).join(', ')}`);
     this.#uniforms.luxelView.value = VIEWS[view];
