@@ -94,7 +94,7 @@ test('a lamp that is set to red lights its side, in red', needsBaked, async () =
     window.room.setLight('left lamp', 'red', 60);
     const red = window.look();
     window.room.setLight('left lamp', 0x000000);
-    window.room.setLight('right lamp', [0, 0, 1].reduce((color, value, i) => color.setComponent(i, value), new window.stage.THREE.Color()), 60);
+    window.room.setLight('right lamp', 'blue', 60);
     return { dark, red, blue: window.look() };
   });
   for (const [name, rgb] of Object.entries(seen.dark)) if (name !== 'sign') assert.ok(isBlack(rgb), `${name} is ${rgb} with all lights off`);
@@ -336,6 +336,51 @@ test('a picture on the monitor lights the sides it shows, and is the right way u
   assert.ok(Math.abs(seen.cells[0] - 100) < 1 && seen.cells.slice(1).every((value) => value < 0.5), `${seen.cells}`);
   assert.ok(live.leftWall[1] > 30 && live.leftWall[0] < 1, `a live canvas: ${live.leftWall}`);
   assert.ok(pixels.ceiling[0] > 10 && pixels.ceiling[1] < 1 && pixels.screenTopLeft[0] > 100, `pixels: ${pixels.ceiling}, ${pixels.screenTopLeft}`);
+});
+
+test('a video on the monitor lights the room frame by frame', needsBaked, async () => {
+  const { green, screen, authored } = await inPage(async () => {
+    const { room } = window;
+    const canvas = document.createElement('canvas');
+    canvas.width = 160;
+    canvas.height = 90;
+    const context = canvas.getContext('2d');
+    const recorder = new MediaRecorder(canvas.captureStream(30), { mimeType: 'video/webm;codecs=vp8' });
+    const parts = [];
+    recorder.ondataavailable = ({ data }) => parts.push(data);
+    const stopped = new Promise((resolve) => (recorder.onstop = resolve));
+    recorder.start();
+    for (let i = 0; i < 10; i++) {
+      context.fillStyle = i % 2 ? '#00ff00' : '#00fe00';
+      context.fillRect(0, 0, 160, 90);
+      await new Promise((resolve) => setTimeout(resolve, 40));
+    }
+    recorder.stop();
+    await stopped;
+    const video = document.createElement('video');
+    Object.assign(video, { muted: true, loop: true, src: URL.createObjectURL(new Blob(parts, { type: 'video/webm' })) });
+    window.only({});
+    const authoredCells = () => room.lights.filter(({ monitor }) => monitor).map(({ color, intensity }) => color.g * intensity);
+    await video.play();
+    room.monitors[0].strength.setRGB(20, 20, 20);
+    room.monitors[0].setVideo(video);
+    let seen;
+    for (let i = 0; i < 100; i++) {
+      await new Promise((resolve) => setTimeout(resolve, 50));
+      seen = window.look();
+      if (seen.leftWall[1] > 1) break;
+    }
+    const cells = room.lights.filter(({ monitor }) => monitor).map(({ color, intensity }) => [color.r * intensity, color.g * intensity]);
+    video.pause();
+    room.monitors[0].setVideo(null);
+    URL.revokeObjectURL(video.src);
+    const result = { green: seen, screen: cells, authored: authoredCells() };
+    window.reset();
+    return result;
+  });
+  assert.ok(green.leftWall[1] > 10 && green.leftWall[0] < green.leftWall[1] / 4, `left wall ${green.leftWall}`);
+  for (const [red, light] of screen) assert.ok(light > 15 && red < 1, `cells ${screen}`); // a codec keeps colours nearly
+  for (const cell of authored) assert.ok(Math.abs(cell - 20) < 1e-3, `without a picture: ${authored}`);
 });
 
 test('programs, animations of the file and bound lights drive layers', needsBaked, async () => {
