@@ -105,6 +105,30 @@ static void use_accumulator(lxrt_pack *pack, const lxrt_info *info)
     free(memory);
 }
 
+// Colours that animations and monitors make of whatever the pack says.
+static void use_animations(lxrt_pack *pack, const lxrt_info *info)
+{
+    static const uint8_t picture[5 * 7 * 4] = {255, 2, 99, 0, 17};
+    static const double times_s[] = {0, -3.7, 0.7, 86399, 1e9, -1e300};
+    lxrt_animation animation;
+    lxrt_monitor monitor;
+    for (uint32_t i = 0; i < info->animation_count && i < 64; ++i) {
+        require(lxrt_get_animation(pack, i, &animation) == LXRT_OK && animation.layer < info->layer_count && isfinite(animation.duration_s));
+        require(lxrt_play(pack, animation.name, i % 3 != 0) == LXRT_OK);
+    }
+    for (size_t t = 0; t < sizeof times_s / sizeof *times_s; ++t) require(lxrt_update(pack, times_s[t]) <= info->layer_count);
+    for (uint32_t i = 0; i < info->monitor_count && i < 8; ++i) {
+        require(lxrt_get_monitor(pack, i, &monitor) == LXRT_OK && strlen(monitor.name) < SIZE_MAX);
+        require((uint64_t)monitor.first_layer + monitor.columns * monitor.rows <= info->layer_count);
+        if (monitor.columns * monitor.rows > 4096) continue; // slow, not unsafe
+        require(lxrt_monitor_update(pack, i, picture, 5, 7, 0, i % 2 ? LXRT_PIXELS_RGB8_SRGB : LXRT_PIXELS_RGBA8_SRGB) == LXRT_OK);
+    }
+    for (uint32_t i = 0; i < info->layer_count; ++i) {
+        float rgb[3];
+        require(lxrt_get_layer(pack, i, rgb) == LXRT_OK && isfinite(rgb[0]) && isfinite(rgb[1]) && isfinite(rgb[2]));
+    }
+}
+
 static void read_light(void *user, uint32_t layer, double time_s, float rgb[3])
 {
     (void)user;
