@@ -51,7 +51,7 @@ LXRT_API const char *lxrt_result_name(lxrt_result result);
 
 typedef struct lxrt_pack lxrt_pack;
 
-/// Checks the pack and tells how much memory lxrt_open needs for it (some dozen bytes a layer). No alignment is asked of `data`.
+/// Checks the pack and tells how much memory lxrt_open needs for it (about a hundred bytes a layer). No alignment is asked of `data`.
 LXRT_API lxrt_result lxrt_memory_bytes(const void *data, size_t size, size_t *out_bytes);
 /// Checks the pack, hostile ones too, and puts a handle into `memory`. Layers start at their authored colours. `data` and `memory`
 /// must stay as long as the pack is used; `data` is never written to. There is nothing to close.
