@@ -103,6 +103,30 @@ static void use_accumulator(lxrt_pack *pack, const lxrt_info *info)
     free(memory);
 }
 
+// Colours that animations and monitors make of whatever the pack says.
+static void use_animations(lxrt_pack *pack, const lxrt_info *info)
+{
+    static const uint8_t picture[5 * 7 * 4] = {255, 2, 99, 0, 17};
+    static const double times_s[] = {0, -3.7, 0.7, 86399, 1e9, -1e300};
+    lxrt_animation animation;
+    lxrt_monitor monitor;
+    for (uint32_t i = 0; i < info->animation_count && i < 64; ++i) {
+        require(lxrt_get_animation(pack, i, &animation) == LXRT_OK && animation.layer < info->layer_count && isfinite(animation.duration_s));
+        require(lxrt_play(pack, animation.name, i % 3 != 0) == LXRT_OK);
+    }
+    for (size_t t = 0; t < sizeof times_s / sizeof *times_s; ++t) require(lxrt_update(pack, times_s[t]) <= info->layer_count);
+    for (uint32_t i = 0; i < info->monitor_count && i < 8; ++i) {
+        require(lxrt_get_monitor(pack, i, &monitor) == LXRT_OK && strlen(monitor.name) < SIZE_MAX);
+        require((uint64_t)monitor.first_layer + monitor.columns * monitor.rows <= info->layer_count);
+        if (monitor.columns * monitor.rows > 4096) continue; // slow, not unsafe
+        require(lxrt_monitor_update(pack, i, picture, 5, 7, 0, i % 2 ? LXRT_PIXELS_RGB8_SRGB : LXRT_PIXELS_RGBA8_SRGB) == LXRT_OK);
+    }
+    for (uint32_t i = 0; i < info->layer_count; ++i) {
+        float rgb[3];
+        require(lxrt_get_layer(pack, i, rgb) == LXRT_OK && isfinite(rgb[0]) && isfinite(rgb[1]) && isfinite(rgb[2]));
+    }
+}
+
 static void read_light(void *user, uint32_t layer, double time_s, float rgb[3])
 {
     (void)user;
@@ -110,22 +134,9 @@ static void read_light(void *user, uint32_t layer, double time_s, float rgb[3])
     rgb[layer % 3] = (float)time_s;
 }
 
+// Drivers that code sets, beside those of the pack.
 static void use_drivers(lxrt_pack *pack, const lxrt_info *info)
 {
-    static const double times_s[] = {0, 0.25, 1e9, -3.7, 1e300, -1e300};
-    float rgb[3];
-    for (size_t i = 0; i < sizeof times_s / sizeof *times_s; ++i) {
-        lxrt_update(pack, times_s[i]);
-        for (uint32_t layer = 0; layer < info->layer_count && layer < 64; ++layer)
-            require(lxrt_get_layer(pack, layer, rgb) == LXRT_OK && is_finite(rgb));
-        if (info->animation_count == 0) break;
-    }
-    lxrt_animation animation;
-    if (lxrt_get_animation(pack, 0, &animation) == LXRT_OK) {
-        require(lxrt_play(pack, animation.name, 0) == LXRT_OK);
-        lxrt_update(pack, 0.5);
-        require(lxrt_play(pack, NULL, 1) == LXRT_OK);
-    }
     if (info->layer_count > 0) {
         lxrt_program program = lxrt_program_default();
         program.kind = LXRT_PROGRAM_FLICKER;
@@ -133,12 +144,12 @@ static void use_drivers(lxrt_pack *pack, const lxrt_info *info)
         require(lxrt_set_callback(pack, info->layer_count - 1, read_light, NULL) == LXRT_OK);
         lxrt_update(pack, 1.5);
         require(lxrt_reset_driver(pack, 0) == LXRT_OK);
+        require(lxrt_play(pack, NULL, 1) == LXRT_OK || info->animation_count == 0);
         lxrt_update(pack, 2.5);
     }
-    static const unsigned char picture[16 * 5 * 3] = {255, 3, 7, 200};
+    static const unsigned char picture[16 * 3] = {255, 3, 7, 200};
     for (uint32_t i = 0; i < info->monitor_count && i < 8; ++i) {
-        lxrt_monitor_configure(pack, i, NULL, 0.25f);
-        lxrt_monitor_update(pack, i, picture, 4, 3, 0, LXRT_PIXELS_RGBA8_SRGB);
+        require(lxrt_monitor_configure(pack, i, NULL, 0.25f) == LXRT_OK);
         lxrt_monitor_update(pack, i, picture, 5, 3, 16, LXRT_PIXELS_RGB8_SRGB);
     }
 }
@@ -154,6 +165,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     lxrt_get_info(pack, &info);
     use_tables(pack, &info);
     use_texels(pack, &info);
+    use_animations(pack, &info);
     use_drivers(pack, &info);
     use_accumulator(pack, &info);
     if (info.layer_count > 0) {
