@@ -175,7 +175,7 @@ def make_materials(b):
     glow("pendant_bulb", (1.0, 0.8, 0.55), 250.0)
     glow("neon_pink", (1.0, 0.05, 0.3), 50.0)
     glow("neon_blue", (0.04, 0.3, 1.0), 50.0)
-    glow("neon_amber", (1.0, 0.36, 0.02), 32.0)
+    glow("neon_amber", (1.0, 0.36, 0.02), 32.0, extras={"luxel_animate": "flicker 80ms low=0.25"})  # a tired tube
     glow("counter_glow", (0.03, 0.75, 0.6), 20.0)
     glow("fairy_bulb", (1.0, 0.74, 0.42), 600.0)
     glow("candle_flame", (1.0, 0.56, 0.18), 4000.0)
@@ -1010,7 +1010,8 @@ def make_candles(b, tables):
     for k, p in enumerate(places):
         p = v_add(p, (0, -SINK, 0))
         b.node("candle_holder_%d" % (k + 1), mesh=holders[colors[k]], at=p)
-        b.node("candle_%d" % (k + 1), mesh=flame, at=v_add(p, (0, 0.046, 0)))
+        flicker = "flicker %gs low=0.6" % (0.14 + 0.02 * k)
+        b.node("candle_%d" % (k + 1), mesh=flame, at=v_add(p, (0, 0.046, 0)), animate=flicker)
 
 
 def arch(radius, foot, steps=20):
@@ -1068,7 +1069,7 @@ def make_jukebox(b):
         for p in panel.positions
     ]
     glow.append(panel.translate(0, 0, 0.495))
-    b.node("jukebox", (glow, "jukebox"), at=at, turn=turn)
+    b.node("jukebox", (glow, "jukebox"), at=at, turn=turn, animate="wheel 24s color=#ff8a70")
 
 
 def make_tv(b):
@@ -1078,7 +1079,7 @@ def make_tv(b):
         box(w + 0.03, h + 0.03, 0.05, (0, 0, 0.075)), box(0.24, 0.24, 0.07, (0, 0, 0.025), skip="-z")
     )
     b.node("tv_case", (case, "black metal"), at=at)
-    b.node("tv_screen", (quad(w, h, fit=True), "tv"), at=v_add(at, (0, 0, 0.1015)), layer="tv")
+    b.node("tv_screen", (quad(w, h, fit=True), "tv"), at=v_add(at, (0, 0, 0.1015)), layer="tv", monitor="4x3")
 
 
 def make_lava_lamp(b, at):
@@ -1108,7 +1109,7 @@ def make_lava_lamp(b, at):
 
 def make_fairy_lights(b):
     """Two strings under the beams, each one node of many instances; one layer because their parent says so."""
-    group = b.node("fairy_lights", layer="fairy")
+    group = b.node("fairy_lights", layer="fairy", animate="pulse 7s low=0.5")
     bulb = b.mesh(
         "fairy_bulb",
         (
@@ -1447,6 +1448,19 @@ def make_street(b):
     b.node("moon", light=moon, at=(-2, 8, 12), rotation=look((-0.6, 0.85, 1.0), (0, 0, 0)), radius=0.53)
 
 
+def make_animations(b):
+    """Light that glTF itself animates: the lava lamp breathes, the exit sign has a bad contact."""
+    lava, exit_sign = b.materials["lava"][0], b.materials["exit"][0]
+    still = (0.0, 0.0, 0.0)
+    breath = []
+    for color in ((1.0, 1.0, 1.0), (1.0, 0.45, 0.35), (0.75, 0.9, 1.0), (1.0, 1.0, 1.0)):
+        breath += [still, color, still]
+    b.g.add_animation("lava", ("/materials/%d/emissiveFactor" % lava, (0.0, 4.0, 8.0, 12.0), breath, "CUBICSPLINE"))
+    strength = "/materials/%d/extensions/KHR_materials_emissive_strength/emissiveStrength" % exit_sign
+    times, values = (0.0, 5.0, 5.1, 5.25, 5.4, 9.0), (8.0, 1.0, 8.0, 2.0, 8.0, 8.0)
+    b.g.add_animation("exit sign", (strength, times, values, "STEP"))
+
+
 def make_cameras(b):
     for name, eye, target, fov in (
         ("main", (2.7, 1.5, 2.2), (-1.05, 1.36, -1.9), 48),
@@ -1481,6 +1495,7 @@ def build():
     make_plant(b, (3.42, -SINK, 2.42))
     make_clutter(b, glasses, bottles, tables)
     make_street(b)
+    make_animations(b)
     return b.g
 
 

@@ -783,6 +783,24 @@ class Gltf:
             self.json["nodes"][parent].setdefault("children", []).append(index)
         return index
 
+    # animations
+
+    def add_animation(self, name, *channels):
+        """channels: (JSON pointer, times, values, "STEP", "LINEAR" or "CUBICSPLINE"); of the latter's values three belong to
+        a key: in-tangent, value, out-tangent.  KHR_animation_pointer."""
+        self._extension("KHR_animation_pointer")
+        animation = {"name": name, "samplers": [], "channels": []}
+        for pointer, times, values, interpolation in channels:
+            sampler = {
+                "input": self.add_accessor(times, bounds=True, target=None),
+                "output": self.add_accessor(values, target=None),
+                "interpolation": interpolation,
+            }
+            target = {"path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": pointer}}}
+            animation["channels"].append({"sampler": len(animation["samplers"]), "target": target})
+            animation["samplers"].append(sampler)
+        return self._push("animations", animation)
+
     # output
 
     def triangles(self):

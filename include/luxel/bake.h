@@ -63,6 +63,7 @@ typedef struct lx_save_desc {
     uint32_t formats;        ///< OR of lx_lightmap_format, besides the pack, which is always written. Default 0.
     lx_encoding encoding;
     bool preview;            ///< Render preview.png. Default true.
+    bool report;             ///< Write report.html: a page that shows all there is to see. Default true.
     uint32_t preview_width;  ///< Default 960.
     uint32_t preview_height; ///< Default 540.
 } lx_save_desc;
@@ -77,6 +78,20 @@ LX_API lx_result lx_bake_save(lx_bake *bake, const char *folder, const lx_save_d
                               lx_error *error);
 LX_API void lx_bake_destroy(lx_bake *bake);
 
+/// What a baked folder costs at run time, in bytes (lxrt_get_budget says more).
+typedef struct lx_budget {
+    uint64_t ram;          ///< The pack, and the handle of the runtime.
+    uint64_t accumulator;  ///< Beside it, if the sum of all pages is kept so that only changes are added.
+    uint64_t gpu_composed; ///< One lightmap with mips as RGB9E5, composed on the CPU. Twice that in half floats.
+    uint64_t gpu_layers;   ///< All layers with mips as RGB9E5, summed per pixel.
+    uint64_t dense;        ///< The pack's texels if no block were absent.
+} lx_budget;
+
+/// Where the time went, in seconds.
+typedef struct lx_stage_seconds {
+    double import, unwrap, luxels, bake, post, save, preview;
+} lx_stage_seconds;
+
 typedef struct lx_bake_summary {
     uint32_t page_count, page_size, layer_count, source_count;
     uint64_t texel_count;  ///< Texels that are covered by a surface.
@@ -85,7 +100,9 @@ typedef struct lx_bake_summary {
     float coverage;        ///< Covered share of all pages.
     uint64_t path_count, ray_count; ///< Rays of both kinds that were traced.
     double seconds;        ///< lx_bake_run.
+    lx_stage_seconds stages; ///< Those of saving after lx_bake_save.
     uint64_t pack_bytes;   ///< After lx_bake_save.
+    lx_budget budget;      ///< After lx_bake_save.
     float view_ev;         ///< Exposure of the preview, after lx_bake_save with a preview.
 } lx_bake_summary;
 

@@ -31,7 +31,10 @@ LX_API lx_result lx_baked_set(lx_baked *baked, const char *assignment, lx_error 
 /// Irradiance of one page at the current colours: page_size² RGB floats, row 0 first.
 LX_API lx_result lx_baked_compose(const lx_baked *baked, uint32_t page, float *out_rgb, lx_error *error);
 
-/// What is in the folder as JSON text (the manifest, plus sizes and coverage); free with lx_text_free.
+/// What the folder costs at run time.
+LX_API void lx_baked_get_budget(const lx_baked *baked, lx_budget *out);
+
+/// What is in the folder as JSON text (the manifest, plus sizes in bytes); free with lx_text_free.
 LX_API lx_result lx_baked_describe(const lx_baked *baked, char **out_json, lx_error *error);
 
 #ifdef __cplusplus

@@ -23,6 +23,18 @@ LX_API lx_result lx_host_check_input(const char *path, lx_error *error);
 /// Checks early that a file could be written at `path`: its folder exists and may be written, and it is no folder itself.
 LX_API lx_result lx_host_check_output(const char *path, lx_error *error);
 
+/// Waits; a signal may end it early.
+LX_API void lx_host_sleep(double seconds);
+
+/// The folder of the built viewer: $LUXEL_VIEWER if that is set, else `viewer` beside this program, else `../share/luxel/viewer` from there.
+/// LX_ERROR_FORMAT if none of them holds an index.html. `size` bytes in `out`.
+LX_API lx_result lx_host_find_viewer(char *out, size_t size, lx_error *error);
+
+/// True if there is a display on which a browser could open.
+LX_API bool lx_host_has_display(void);
+/// Shows an address in the person's browser, which runs on its own. False: there is no program for it (xdg-open).
+LX_API bool lx_host_open_browser(const char *url);
+
 #ifdef __cplusplus
 }
 #endif

@@ -6,5 +6,6 @@
 #include "luxel/baked.h"
 #include "luxel/picture.h"
 #include "luxel/render.h"
+#include "luxel/serve.h"
 
 #endif

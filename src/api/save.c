@@ -1,6 +1,8 @@
 // Saving a bake: all files into OUT.partial, the preview from what was just written, then the swap.
+#include "api/report.h"
 #include "bake/baked.h"
 #include "bake/save.h"
+#include "base/clock.h"
 #include "base/context.h"
 #include "base/error.h"
 #include "image/image.h"
@@ -10,7 +12,7 @@
 
 lx_save_desc lx_save_desc_default(void)
 {
-    return (lx_save_desc){.preview = true, .preview_width = 960, .preview_height = 540};
+    return (lx_save_desc){.preview = true, .report = true, .preview_width = 960, .preview_height = 540};
 }
 
 lx_result lx_bake_check_folder(const char *folder, lx_error *error)
@@ -47,15 +49,11 @@ static lx_result create_silent_context(const lx_context *like, lx_context **out,
     return lx_context_create(&desc, out, error);
 }
 
-// Renders the folder as it will be opened later, so that the preview also proves that it can be.
-static lx_result write_preview(lx_bake *bake, const lx_save_desc *desc, const lx_new_folder *folder, const lx_progress_sink *progress,
-                               lx_manifest *manifest, lx_error *error)
+static lx_result write_preview(lx_bake *bake, const lx_save_desc *desc, lx_baked *baked, const lx_new_folder *folder,
+                               const lx_progress_sink *progress, lx_manifest *manifest, lx_image *out_picture, lx_error *error)
 {
     lx_result result = LX_OK;
-    lx_context *context = NULL;
-    lx_baked *baked = NULL;
     lx_bytes png = {0};
-    lx_image image = {0};
     lx_render_desc render = lx_render_desc_default();
     render.width = desc->preview_width;
     render.height = desc->preview_height;
@@ -64,22 +62,75 @@ static lx_result write_preview(lx_bake *bake, const lx_save_desc *desc, const lx
         result = lx_fail_memory(error, "preview");
         goto cleanup;
     }
-    LX_TRY(lx_image_create(render.width, render.height, 3, LX_PIXEL_U8, &image, error));
-    LX_TRY(create_silent_context(bake->scene->context, &context, error));
-    LX_TRY(lx_baked_open(context, folder->partial, true, &baked, error));
+    LX_TRY(lx_image_create(render.width, render.height, 3, LX_PIXEL_U8, out_picture, error));
     LX_TRY(lx_render_baked(baked, &render, false, progress, rgb, &manifest->view_ev, error));
-    lx_render_develop(&render, manifest->view_ev, rgb, image.u8);
-    LX_TRY(lx_png_encode(&image, &png, error));
+    lx_render_develop(&render, manifest->view_ev, rgb, out_picture->u8);
+    LX_TRY(lx_png_encode(out_picture, &png, error));
     LX_TRY(lx_new_folder_write(folder, "preview.png", png.data, png.size, error));
     manifest->has_view = true;
     bake->summary.view_ev = manifest->view_ev;
-    LX_TRY(lx_bake_write_manifest(manifest, folder, error));
 cleanup:
+    lx_bytes_release(&png);
+    lx_free(rgb);
+    return result;
+}
+
+static lx_result write_report(const lx_bake *bake, lx_baked *baked, const lx_new_folder *folder, const lx_manifest *manifest,
+                              const lx_image *preview, lx_error *error)
+{
+    enum { thumbnail_width = 240, thumbnail_samples = 4 };
+    lx_result result = LX_OK;
+    lx_builder html = {0};
+    lx_seen seen = {0};
+    if (preview) {
+        lx_render_desc desc = lx_render_desc_default();
+        desc.width = thumbnail_width;
+        desc.height = (uint32_t)((uint64_t)thumbnail_width * preview->height / preview->width);
+        if (desc.height == 0) desc.height = 1;
+        if (desc.height > 4 * thumbnail_width) desc.height = 4 * thumbnail_width;
+        desc.samples = thumbnail_samples;
+        LX_TRY(lx_seen_create(baked, &desc, &seen, error));
+    }
+    const lx_report report = {
+        .title = lx_path_name(folder->path),
+        .files_folder = folder->partial,
+        .bake = bake,
+        .baked = baked,
+        .manifest = manifest,
+        .preview = preview,
+        .seen = preview ? &seen : NULL,
+    };
+    LX_TRY(lx_report_build(&report, &html, error));
+    LX_TRY(lx_new_folder_write(folder, "report.html", html.text, html.length, error));
+cleanup:
+    lx_seen_release(&seen);
+    lx_builder_release(&html);
+    return result;
+}
+
+// Opens the folder as it will be opened later, so that preview and report also prove that it can be.
+static lx_result write_from_folder(lx_bake *bake, const lx_save_desc *desc, const lx_new_folder *folder, const lx_progress_sink *progress,
+                                   lx_manifest *manifest, lx_error *error)
+{
+    lx_result result = LX_OK;
+    lx_context *context = NULL;
+    lx_baked *baked = NULL;
+    lx_image picture = {0};
+    const double start = lx_seconds();
+    LX_TRY(create_silent_context(bake->scene->context, &context, error));
+    LX_TRY(lx_baked_open(context, folder->partial, desc->preview, &baked, error));
+    lx_baked_get_budget(baked, &manifest->memory);
+    bake->summary.budget = manifest->memory;
+    if (desc->preview) {
+        LX_TRY(write_preview(bake, desc, baked, folder, progress, manifest, &picture, error));
+        manifest->bake.stages.preview = lx_seconds() - start;
+    }
+    LX_TRY(lx_bake_write_manifest(manifest, folder, error));
+    if (desc->report) LX_TRY(write_report(bake, baked, folder, manifest, desc->preview ? &picture : NULL, error));
+cleanup:
+    lx_image_release(&picture);
     lx_baked_destroy(baked);
     lx_context_destroy(context);
-    lx_bytes_release(&png);
-    lx_image_release(&image);
-    lx_free(rgb);
     return result;
 }
 
@@ -89,12 +140,15 @@ lx_result lx_bake_save(lx_bake *bake, const char *folder, const lx_save_desc *de
     lx_new_folder fresh = {0};
     lx_manifest manifest = {0};
     const lx_save_desc defaults = lx_save_desc_default();
+    const double start = lx_seconds();
     if (!desc) desc = &defaults;
     LX_TRY(check_desc(desc, error));
     LX_TRY(lx_new_folder_begin(folder, &fresh, error));
     LX_TRY(lx_bake_write(bake, desc, &fresh, progress, &manifest, error));
+    manifest.bake.stages.save = lx_seconds() - start;
     LX_TRY(lx_bake_write_manifest(&manifest, &fresh, error));
-    if (desc->preview) LX_TRY(write_preview(bake, desc, &fresh, progress, &manifest, error));
+    LX_TRY(write_from_folder(bake, desc, &fresh, progress, &manifest, error));
+    bake->summary.stages = manifest.bake.stages;
     LX_TRY(lx_new_folder_commit(&fresh, error));
 cleanup:
     lx_new_folder_abort(&fresh);

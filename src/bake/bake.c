@@ -3,6 +3,7 @@
 #include "bake/bake.h"
 
 #include "bake/advice.h"
+#include "bake/animations.h"
 #include "bake/layers.h"
 #include "bake/luxels.h"
 #include "base/clock.h"
@@ -45,6 +46,18 @@ static lx_result check_desc(const lx_bake_desc *desc, lx_error *error)
     return LX_OK;
 }
 
+// Monitors are told by cell, unless all light goes into one layer: then their pictures need no cells.
+static lx_result create_tracer(lx_bake *bake, lx_error *error)
+{
+    const lx_scene *scene = bake->scene;
+    bool *cells = lx_calloc_array(scene->source_count, sizeof *cells);
+    if (!cells) return lx_fail_memory(error, "bake");
+    for (uint32_t i = 0; i < scene->source_count; ++i) cells[i] = scene->sources[i].columns > 0 && !bake->desc.combined;
+    const lx_result result = lx_tracer_create(scene, &bake->desc.transport, false, cells, &bake->tracer, error);
+    lx_free(cells);
+    return result;
+}
+
 lx_result lx_bake_create(const lx_scene *scene, const lx_atlas *atlas, const lx_bake_desc *desc, lx_bake **out_bake,
                          lx_error *error)
 {
@@ -55,8 +68,9 @@ lx_result lx_bake_create(const lx_scene *scene, const lx_atlas *atlas, const lx_
     bake->scene = scene;
     bake->atlas = atlas;
     bake->desc = *desc;
-    LX_TRY(lx_tracer_create(scene, &desc->transport, false, &bake->tracer, error));
+    LX_TRY(create_tracer(bake, error));
     LX_TRY(lx_layers_build(bake, error));
+    LX_TRY(lx_animations_build(bake, error));
     size_t texel_count, value_count;
     if (!lx_mul_size((size_t)atlas->page_size * atlas->page_size, atlas->page_count, &texel_count) ||
         !lx_mul_size(texel_count * 3, bake->layer_count, &value_count)) {
@@ -82,6 +96,7 @@ cleanup:
 void lx_bake_destroy(lx_bake *bake)
 {
     if (!bake) return;
+    lx_animations_release(bake);
     lx_layers_release(bake);
     lx_tracer_destroy(bake->tracer);
     lx_free(bake->texels);
@@ -121,6 +136,7 @@ typedef struct bake_job {
     uint8_t *invalid;      // [page][texel]
     lx_path_settings settings;
     uint32_t site_count;
+    lx_stage_seconds stages;
 } bake_job;
 
 static uint32_t texel_stream(const bake_job *job, uint32_t page, uint32_t texel)
@@ -280,6 +296,14 @@ cleanup:
     return result;
 }
 
+// Seconds since *start, which becomes now.
+static double lap(double *start)
+{
+    const double now = lx_seconds(), seconds = now - *start;
+    *start = now;
+    return seconds;
+}
+
 static void summarise(bake_job *job, uint32_t workers, double start)
 {
     lx_bake *bake = job->bake;
@@ -287,7 +311,7 @@ static void summarise(bake_job *job, uint32_t workers, double start)
     lx_bake_summary *s = &bake->summary;
     *s = (lx_bake_summary){.page_count = bake->atlas->page_count, .page_size = bake->atlas->page_size,
                            .layer_count = bake->layer_count, .source_count = bake->source_count,
-                           .texels_per_m = bake->atlas->texels_per_m};
+                           .texels_per_m = bake->atlas->texels_per_m, .stages = job->stages};
     for (size_t i = 0; i < total; ++i) {
         s->texel_count += bake->texel_coverage[i] != 0;
         s->invalid_count += bake->texel_coverage[i] && job->invalid[i];
@@ -323,11 +347,12 @@ lx_result lx_bake_run(lx_bake *bake, const lx_progress_sink *progress, lx_error 
 {
     lx_result result = LX_OK;
     const double start = lx_seconds();
+    double stage_start = start;
     const lx_atlas *atlas = bake->atlas;
     lx_pool *pool = bake->scene->context->pool;
     const uint32_t workers = lx_pool_worker_count(pool), samples = bake->desc.samples;
     float *weights = NULL;
-    bake_job job = {.bake = bake, .site_count = samples < most_sites ? samples : (uint32_t)most_sites};
+    bake_job job = {.bake = bake, .stages = {.import = bake->scene->import_seconds, .unwrap = atlas->seconds}, .site_count = samples < most_sites ? samples : (uint32_t)most_sites};
     job.settings = (lx_path_settings){.tracer = bake->tracer, .uses = bake->uses, .layer_count = bake->layer_count,
                                       .bounces = bake->desc.direct_only ? 0 : bake->desc.transport.bounces,
                                       .direct = !bake->desc.indirect_only, .indirect = !bake->desc.direct_only};
@@ -347,8 +372,11 @@ lx_result lx_bake_run(lx_bake *bake, const lx_progress_sink *progress, lx_error 
         goto cleanup;
     }
     for (size_t i = 0; i < job.tile_count; ++i) weights[i] = job.tiles[i].texel_count;
+    job.stages.luxels = lap(&stage_start);
     LX_TRY(lx_pool_run_weighted(pool, job.tile_count, weights, bake_tile, &job, "bake", progress, error));
+    job.stages.bake = lap(&stage_start);
     LX_TRY(lx_pool_run(pool, atlas->page_count, fill_page, &job, "post", progress, error));
+    job.stages.post = lap(&stage_start);
     summarise(&job, workers, start);
     check_sum_of_layers(&job);
     lx_advise_on_layers(bake);

@@ -16,6 +16,9 @@ typedef struct lx_layer {
     float color[3];      ///< c = color × intensity at authored strength.
     float intensity;
     uint32_t source_count;
+    const lx_source *monitor; ///< Whose cell it is, the first of its monitors; NULL: none. Borrowed from the scene.
+    uint32_t cell;            ///< Number of the cell.
+    lx_rgb white;             ///< Monitors: c of a white pixel = white × intensity.
 } lx_layer;
 
 struct lx_bake {
@@ -28,6 +31,8 @@ struct lx_bake {
     uint32_t layer_count;
     lx_source_use *uses;   ///< [source_count] per source of the tracer: its layer and its share of it (weight).
     uint32_t source_count;
+
+    struct lx_bake_animations *animations; ///< What drives the layers (bake/animations.h); NULL: nothing.
 
     /// T of every layer: image (page * layer_count + layer), page_size² × RGB floats, row 0 first. Unit light: lux per cd, lx or nt
     /// (for `combined`: lux). After lx_bake_run padding is filled by dilation.

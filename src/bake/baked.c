@@ -174,7 +174,7 @@ static lx_source_use find_use(const lx_baked *baked, const char *name, bool is_s
     lxrt_source source;
     for (uint32_t i = 0; lxrt_get_source(baked->pack, i, &source) == LXRT_OK; ++i)
         if ((source.kind == LXRT_KIND_SKY) == is_sky && strcmp(source.name, name) == 0)
-            return (lx_source_use){(int32_t)source.layer, {source.weight[0], source.weight[1], source.weight[2]}, true};
+            return (lx_source_use){.layer = (int32_t)source.layer, .weight = {source.weight[0], source.weight[1], source.weight[2]}, .direct = true};
     return (lx_source_use){.layer = -1};
 }
 
@@ -314,9 +314,38 @@ lx_rgb lx_baked_source_strength(const lx_baked *baked, uint32_t index)
 {
     const lx_source_use *use = &baked->uses[index];
     if (use->layer < 0) return (lx_rgb){0, 0, 0};
+    const lx_manifest_monitor *monitor = lx_baked_monitor(baked, index);
     float c[3];
     lx_baked_get_layer(baked, (uint32_t)use->layer, c);
+    if (monitor) {
+        const bool off = lx_rgb_is_black(baked->scene->sources[index].color);
+        for (int i = 0; i < 3; ++i) c[i] = off ? 0 : monitor->strength[i];
+    }
     return (lx_rgb){use->weight.r * c[0], use->weight.g * c[1], use->weight.b * c[2]};
+}
+
+const lx_manifest_monitor *lx_baked_monitor(const lx_baked *baked, uint32_t index)
+{
+    const lx_scene *scene = baked->scene;
+    if (index >= scene->source_count || scene->sources[index].columns == 0) return NULL;
+    for (uint32_t i = 0; i < baked->manifest.monitor_count; ++i) {
+        const lx_manifest_monitor *monitor = &baked->manifest.monitors[i];
+        const lx_source *source = &scene->sources[index];
+        if (strcmp(monitor->name, source->name) == 0 && monitor->columns == source->columns && monitor->rows == source->rows) return monitor;
+    }
+    return NULL;
+}
+
+bool lx_baked_monitor_shows_cells(const lx_baked *baked, const lx_manifest_monitor *monitor)
+{
+    for (uint32_t cell = 0; cell < monitor->columns * monitor->rows; ++cell) {
+        const lx_manifest_layer *layer = &baked->manifest.layers[monitor->first_layer + cell];
+        float c[3];
+        lx_baked_get_layer(baked, monitor->first_layer + cell, c);
+        for (int i = 0; i < 3; ++i)
+            if (c[i] != layer->color[i] * layer->intensity) return true;
+    }
+    return false;
 }
 
 lx_result lx_baked_compose(const lx_baked *baked, uint32_t page, float *out_rgb, lx_error *error)
@@ -331,19 +360,31 @@ lx_result lx_baked_compose(const lx_baked *baked, uint32_t page, float *out_rgb,
     return rt == LXRT_OK ? LX_OK : lx_fail(error, LX_ERROR_BACKEND, "%s: page %u: %s", baked->folder, page, lxrt_result_name(rt));
 }
 
+void lx_baked_get_budget(const lx_baked *baked, lx_budget *out)
+{
+    lxrt_budget budget;
+    lxrt_get_budget(baked->pack, &budget);
+    *out = (lx_budget){
+        .ram = budget.pack_bytes + budget.handle_bytes,
+        .accumulator = budget.accumulator_bytes,
+        .gpu_composed = budget.gpu_composed_bytes,
+        .gpu_layers = budget.gpu_layers_bytes,
+        .dense = budget.dense_bytes,
+    };
+}
+
 static uint64_t file_bytes(const lx_baked *baked, const char *name)
 {
     char *path = name ? lx_path_join(baked->folder, name) : NULL;
-    FILE *file = path ? fopen(path, "rb") : NULL;
-    const long size = file && fseek(file, 0, SEEK_END) == 0 ? ftell(file) : -1;
-    if (file) fclose(file);
+    const uint64_t bytes = path ? lx_file_bytes(path) : 0;
     lx_free(path);
-    return size > 0 ? (uint64_t)size : 0;
+    return bytes;
 }
 
 lx_result lx_baked_describe(const lx_baked *baked, char **out_json, lx_error *error)
 {
-    const lx_manifest *manifest = &baked->manifest;
+    lx_manifest copy = baked->manifest, *manifest = &copy; // shallow
+    lx_baked_get_budget(baked, &copy.memory);
     uint64_t *sizes = lx_calloc_array((size_t)manifest->file_count + 2, sizeof *sizes);
     if (!sizes) return lx_fail_memory(error, "description");
     sizes[0] = file_bytes(baked, manifest->scene);

@@ -29,7 +29,12 @@ struct lx_baked {
 
 /// Current colour × intensity of a source, in its unit: what an emitter's texture or a sky's picture is multiplied by. 0 for sources
 /// that are not in the bake. `index`: as in uses.
+/// Of a monitor: what its authored picture is multiplied by; see lx_baked_monitor_shows_cells.
 lx_rgb lx_baked_source_strength(const lx_baked *baked, uint32_t index);
+/// What the bake knows of source `index` of the scene as a monitor; NULL: it is none.
+const lx_manifest_monitor *lx_baked_monitor(const lx_baked *baked, uint32_t index);
+/// True if some cell of the monitor has another colour than the authored one: it no longer shows its own picture.
+bool lx_baked_monitor_shows_cells(const lx_baked *baked, const lx_manifest_monitor *monitor);
 
 /// `*` stands for any text and `?` for one byte; everything else for itself.
 bool lx_glob_matches(const char *pattern, const char *text);

@@ -91,7 +91,7 @@ lx_result lx_irradiance(const lx_scene *scene, const lx_transport_desc *transpor
                           .point_count = count};
     job.blocks_per_point = (samples + block_samples - 1) / block_samples;
     job.points_per_task = samples < block_paths ? block_paths / samples : 1;
-    LX_TRY(lx_tracer_create(scene, transport, false, &tracer, error));
+    LX_TRY(lx_tracer_create(scene, transport, false, NULL, &tracer, error));
     uses = lx_uses_combined(tracer);
     job.sums = lx_calloc_array(count * job.blocks_per_point, 3 * sizeof *job.sums);
     job.scratch = lx_calloc_array(workers, sizeof *job.scratch);

@@ -2,6 +2,10 @@
 //
 // A group's sources keep their authored proportions: T = sum of (colour · intensity / K) T_s with K the largest channel value in the group,
 // and c = K · white. If all colours are equal the colour stays free: T = sum of (intensity / strongest) T_s, c = colour × strongest.
+//
+// A monitor takes as many layers as it has cells, one after the other: T of a cell is that cell at unit white radiance, c its share of the
+// picture: colour of the monitor × mean of the emissive texture there. Monitors of one `luxel_layer` share them. In a `combined` bake a monitor
+// is an emitter like others, with its picture in full.
 #include "bake/layers.h"
 
 #include "base/error.h"
@@ -23,6 +27,22 @@ static lx_rgb authored(const lx_source *s)
     return lx_rgb_scale(s->color, s->intensity);
 }
 
+static bool is_monitor(const lx_source *s)
+{
+    return s->columns > 0;
+}
+
+// What a source is weighed by within its group: a monitor by a white picture, be it on or off.
+static lx_rgb full_color(const lx_source *s)
+{
+    return is_monitor(s) ? s->white : s->color;
+}
+
+static bool is_off(const lx_source *s)
+{
+    return is_monitor(s) && lx_rgb_is_black(s->color);
+}
+
 lx_source_use *lx_uses_combined(const lx_tracer *tracer)
 {
     const uint32_t count = lx_tracer_source_count(tracer);
@@ -31,6 +51,7 @@ lx_source_use *lx_uses_combined(const lx_tracer *tracer)
     for (uint32_t i = 0; i < count; ++i) {
         const lx_source *s = lx_tracer_source(tracer, i);
         uses[i] = (lx_source_use){.layer = 0, .weight = authored(s), .direct = s->mode != LX_MODE_MIXED};
+        if (lx_tracer_is_told_by_cell(tracer, i)) uses[i].cells = s->picture;
     }
     return uses;
 }
@@ -68,7 +89,7 @@ static lx_result group_further(const lx_bake *bake, grouping *g, lx_error *error
     if (single <= wanted) return LX_OK;
     for (uint32_t i = 0; i < g->count; ++i) {
         const lx_source *s = lx_tracer_source(bake->tracer, i);
-        if (s->layer || s->kind != LX_SOURCE_EMISSIVE) continue;
+        if (s->layer || s->kind != LX_SOURCE_EMISSIVE || is_monitor(s)) continue;
         const char *name = scene->materials[s->material].name;
         const lx_result result = set_key(g, i, name[0] ? lx_strdup(name) : lx_format("material_%d", s->material), error);
         if (result != LX_OK) return result;
@@ -79,7 +100,7 @@ static lx_result group_further(const lx_bake *bake, grouping *g, lx_error *error
         how = "by material and parent node";
         for (uint32_t i = 0; i < g->count; ++i) {
             const lx_source *s = lx_tracer_source(bake->tracer, i);
-            if (s->layer || s->kind == LX_SOURCE_SKY) continue;
+            if (s->layer || s->kind == LX_SOURCE_SKY || is_monitor(s)) continue;
             char *key = s->parent_node < 0 ? lx_format("top level (%s)", unit_of(s->kind))
                                            : lx_format("children of node %d (%s)", s->parent_node, unit_of(s->kind));
             const lx_result result = set_key(g, i, key, error);
@@ -133,15 +154,16 @@ static void weigh_members(lx_bake *bake, uint32_t layer_index)
     lx_layer *layer = &bake->layers[layer_index];
     lx_rgb color = {0, 0, 0};
     bool first = true, equal = true;
-    float strongest = 0, largest = 0;
+    float strongest = 0, largest = 0, widest = 0;
     for (uint32_t i = 0; i < bake->source_count; ++i) {
         if (bake->uses[i].layer != (int32_t)layer_index) continue;
         const lx_source *s = lx_tracer_source(bake->tracer, i);
-        if (first) color = s->color;
-        equal &= same_color(color, s->color);
+        if (first) color = full_color(s);
+        equal &= same_color(color, full_color(s));
         first = false;
         strongest = fmaxf(strongest, s->intensity);
-        largest = fmaxf(largest, lx_rgb_max(authored(s)));
+        widest = fmaxf(widest, s->intensity_scale);
+        largest = fmaxf(largest, s->intensity * lx_rgb_max(full_color(s)));
     }
     const lx_rgb shown = equal ? color : lx_rgb_grey(1);
     layer->color[0] = shown.r;
@@ -153,12 +175,15 @@ static void weigh_members(lx_bake *bake, uint32_t layer_index)
         const lx_source *s = lx_tracer_source(bake->tracer, i);
         lx_rgb weight = {1, 1, 1};
         if (equal && strongest > 0) weight = lx_rgb_grey(s->intensity / strongest);
-        if (!equal && largest > 0) weight = lx_rgb_scale(authored(s), 1 / largest);
+        // All are off: as they would be if one animation turned them up together.
+        if (equal && !(strongest > 0) && widest > 0) weight = lx_rgb_grey(s->intensity_scale / widest);
+        if (!equal && largest > 0) weight = lx_rgb_scale(full_color(s), s->intensity / largest);
         bake->uses[i].weight = weight;
     }
 }
 
-static lx_result check_units(const lx_bake *bake, uint32_t layer_index, lx_error *error)
+// Members that cannot share a layer: different units, or screens whose cells do not fit.
+static lx_result check_members(const lx_bake *bake, uint32_t layer_index, const char *name, lx_error *error)
 {
     const lx_source *first = NULL;
     for (uint32_t i = 0; i < bake->source_count; ++i) {
@@ -167,8 +192,46 @@ static lx_result check_units(const lx_bake *bake, uint32_t layer_index, lx_error
         if (!first) first = s;
         if (strcmp(unit_of(s->kind), unit_of(first->kind)) != 0)
             return lx_fail(error, LX_ERROR_FORMAT,
-                           "layer '%s': sources '%s' (%s) and '%s' (%s) have different units; give them two luxel_layer names",
-                           bake->layers[layer_index].name, first->name, unit_of(first->kind), s->name, unit_of(s->kind));
+                           "layer '%s': sources '%s' (%s) and '%s' (%s) have different units; give them two luxel_layer names", name,
+                           first->name, unit_of(first->kind), s->name, unit_of(s->kind));
+        if (is_monitor(s) != is_monitor(first))
+            return lx_fail(error, LX_ERROR_FORMAT,
+                           "layer '%s': '%s' is a monitor and '%s' is not; give them two luxel_layer names", name,
+                           is_monitor(s) ? s->name : first->name, is_monitor(s) ? first->name : s->name);
+        if (s->columns != first->columns || s->rows != first->rows)
+            return lx_fail(error, LX_ERROR_FORMAT,
+                           "layer '%s': monitors '%s' (%ux%u) and '%s' (%ux%u) have different grids; give them two luxel_layer names", name,
+                           first->name, first->columns, first->rows, s->name, s->columns, s->rows);
+        const bool same = is_off(s) == is_off(first) && (s->picture == first->picture || !is_monitor(s) ||
+                                                         memcmp(s->picture, first->picture, lx_source_cell_count(s) * sizeof *s->picture) == 0);
+        if (!same)
+            lx_log_warning(bake->scene->context->log,
+                           "layer '%s': monitors '%s' and '%s' share their cells but show different pictures; that of '%s' is baked for both",
+                           name, first->name, s->name, first->name);
+    }
+    return LX_OK;
+}
+
+// The cells of a monitor whose layer of cell 0 has been weighed: colour, intensity and node are the same but for the picture.
+static lx_result add_cells(lx_bake *bake, uint32_t layer_index, const lx_source *monitor, const char *name, lx_error *error)
+{
+    const lx_layer whole = bake->layers[layer_index];
+    for (uint32_t cell = 0; cell < lx_source_cell_count(monitor); ++cell) {
+        lx_layer *layer = &bake->layers[layer_index + cell];
+        char *wanted = lx_format("%s/%u", name, cell);
+        char *unique = wanted ? unique_name(bake, wanted) : NULL;
+        lx_free(wanted);
+        if (!unique) return lx_fail_memory(error, "layers");
+        *layer = whole;
+        layer->name = unique;
+        layer->monitor = monitor;
+        layer->cell = cell;
+        layer->white = lx_rgb_of(whole.color[0], whole.color[1], whole.color[2]);
+        const lx_rgb shown = is_off(monitor) ? lx_rgb_grey(0) : lx_rgb_mul(layer->white, monitor->picture[cell]);
+        layer->color[0] = shown.r;
+        layer->color[1] = shown.g;
+        layer->color[2] = shown.b;
+        bake->layer_count = layer_index + cell + 1;
     }
     return LX_OK;
 }
@@ -176,23 +239,26 @@ static lx_result check_units(const lx_bake *bake, uint32_t layer_index, lx_error
 static lx_result add_layer(lx_bake *bake, const grouping *g, uint32_t first, lx_error *error)
 {
     const lx_source *s = lx_tracer_source(bake->tracer, first);
-    lx_layer *layer = &bake->layers[bake->layer_count];
-    *layer = (lx_layer){.name = unique_name(bake, g->keys[first] ? g->keys[first] : s->name), .kind = s->kind,
-                        .node = node_name(bake, s), .unit = unit_of(s->kind), .mode = LX_MODE_BAKED};
-    if (!layer->name) return lx_fail_memory(error, "layers");
-    const uint32_t index = bake->layer_count++;
+    const char *name = g->keys[first] ? g->keys[first] : s->name;
+    const uint32_t index = bake->layer_count;
+    lx_layer layer = {.kind = s->kind, .node = node_name(bake, s), .unit = unit_of(s->kind), .mode = LX_MODE_BAKED};
     for (uint32_t i = first; i < bake->source_count; ++i) {
         const lx_source *other = lx_tracer_source(bake->tracer, i);
         const bool member = i == first || (g->keys[first] && g->keys[i] && strcmp(g->keys[i], g->keys[first]) == 0);
         if (!member) continue;
         bake->uses[i].layer = (int32_t)index;
         bake->uses[i].direct = other->mode != LX_MODE_MIXED;
-        if (other->mode == LX_MODE_MIXED) layer->mode = LX_MODE_MIXED;
-        ++layer->source_count;
+        if (other->mode == LX_MODE_MIXED) layer.mode = LX_MODE_MIXED;
+        ++layer.source_count;
     }
-    const lx_result result = check_units(bake, index, error);
+    const lx_result result = check_members(bake, index, name, error);
     if (result != LX_OK) return result;
+    if (!is_monitor(s)) layer.name = unique_name(bake, name);
+    if (!is_monitor(s) && !layer.name) return lx_fail_memory(error, "layers");
+    bake->layers[index] = layer;
     weigh_members(bake, index);
+    if (is_monitor(s)) return add_cells(bake, index, s, name, error);
+    ++bake->layer_count;
     return LX_OK;
 }
 
@@ -217,7 +283,9 @@ lx_result lx_layers_build(lx_bake *bake, lx_error *error)
         lx_log_warning(bake->scene->context->log, "nothing shines, the lightmap will be black: add lights "
                        "(KHR_lights_punctual), emissive materials or a sky (--sky 1,1,1)");
     if (bake->desc.combined) return build_combined(bake, error);
-    bake->layers = lx_calloc_array(g.count, sizeof *bake->layers);
+    size_t most_layers = 0; // without any groups
+    for (uint32_t i = 0; i < g.count; ++i) most_layers += lx_tracer_cell_count(bake->tracer, i);
+    bake->layers = lx_calloc_array(most_layers, sizeof *bake->layers);
     bake->uses = lx_calloc_array(g.count, sizeof *bake->uses);
     g.keys = lx_calloc_array(g.count, sizeof *g.keys);
     if (!bake->layers || !bake->uses || !g.keys) {
@@ -244,6 +312,13 @@ void lx_layers_check(const lx_bake *bake, lx_path_batch *batch, const lx_receive
     lx_source_use *combined = lx_uses_combined(bake->tracer);
     double *sums = lx_calloc_array(bake->layer_count, 3 * sizeof *sums);
     double worst = 0;
+    for (uint32_t i = 0; combined && i < bake->source_count; ++i) { // monitors that share cells show the picture of the first
+        if (!combined[i].cells) continue;
+        const lx_layer *layer = &bake->layers[bake->uses[i].layer];
+        combined[i].cells = layer->monitor->picture;
+        combined[i].weight = is_off(layer->monitor) ? lx_rgb_grey(0)
+                                                    : lx_rgb_scale(lx_rgb_mul(bake->uses[i].weight, layer->white), layer->intensity);
+    }
     lx_path_settings settings = {.tracer = bake->tracer, .bounces = bake->desc.transport.bounces, .direct = true, .indirect = true};
     for (uint32_t i = 0; combined && sums && i < count; ++i) {
         lx_path_start starts[samples];

@@ -12,7 +12,8 @@ void lx_layers_release(lx_bake *bake);
 /// combined: it is the promise that everything rests on.
 void lx_layers_check(const lx_bake *bake, lx_path_batch *batch, const lx_receiver *points, uint32_t count);
 
-/// Uses that put every source into layer 0 at its authored colour; [source count], owned by the caller; NULL: no memory.
+/// Uses that put every source into layer 0 at its authored colour; [source count], owned by the caller; NULL: no memory. Monitors told by
+/// cell shine with the mean colour of each cell.
 lx_source_use *lx_uses_combined(const lx_tracer *tracer);
 
 #endif

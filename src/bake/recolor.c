@@ -2,7 +2,7 @@
 #include "bake/baked.h"
 
 #include "base/error.h"
-#include "math/color.h"
+#include "scene/program.h"
 
 #include <ctype.h>
 #include <stdlib.h>
@@ -76,13 +76,6 @@ static void list_nearest(const lx_baked *baked, const char *name, char *out, siz
     }
 }
 
-static int hex_digit(char c)
-{
-    if (c >= '0' && c <= '9') return c - '0';
-    if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-    return c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
-}
-
 // A number from the front of *text, zero or more and finite; *text moves behind it.
 static bool take_number(const char **text, float *out)
 {
@@ -94,35 +87,14 @@ static bool take_number(const char **text, float *out)
     return true;
 }
 
-// COLOUR from the front of *text.
-static bool take_color(const char **text, float out[3])
-{
-    if (strncmp(*text, "off", 3) == 0) {
-        *text += 3;
-        memset(out, 0, 3 * sizeof *out);
-        return true;
-    }
-    if (**text == '#') {
-        const char *digits = *text + 1;
-        for (int i = 0; i < 3; ++i) {
-            const int high = hex_digit(digits[2 * i]), low = high < 0 ? -1 : hex_digit(digits[2 * i + 1]);
-            if (low < 0) return false;
-            out[i] = lx_srgb_byte_to_linear[16 * high + low];
-        }
-        *text += 7;
-        return true;
-    }
-    for (int i = 0; i < 3; ++i) {
-        if (i > 0 && *(*text)++ != ',') return false;
-        if (!take_number(text, &out[i])) return false;
-    }
-    return true;
-}
-
 // COLOUR[*INTENSITY]; *has_intensity tells whether the second part is there.
 static bool parse_value(const char *text, float color[3], bool *has_intensity, float *intensity)
 {
-    if (!take_color(&text, color)) return false;
+    lx_rgb rgb;
+    if (!lx_take_color(&text, &rgb)) return false;
+    color[0] = rgb.r;
+    color[1] = rgb.g;
+    color[2] = rgb.b;
     *has_intensity = *text == '*';
     if (*has_intensity) {
         ++text;

@@ -2,6 +2,7 @@
 // asked for.
 #include "bake/save.h"
 
+#include "bake/animations.h"
 #include "base/clock.h"
 #include "base/error.h"
 #include "scene/gltf_export.h"
@@ -78,6 +79,48 @@ static const char *kind_name(const lx_bake *bake, lx_source_kind kind)
     return bake->desc.combined ? "combined" : names[kind];
 }
 
+// Every monitor, also those that share their layers with others.
+static void list_monitors(const lx_bake *bake, lx_manifest *manifest)
+{
+    for (uint32_t i = 0; i < bake->source_count; ++i) {
+        const lx_source *source = lx_tracer_source(bake->tracer, i);
+        const int32_t first = bake->uses[i].layer;
+        if (first < 0 || !bake->layers[first].monitor) continue;
+        const lx_layer *layer = &bake->layers[first];
+        manifest->monitors[manifest->monitor_count++] = (lx_manifest_monitor){
+            .name = source->name,
+            .node = source->node,
+            .material = bake->scene->materials[source->material].file_index,
+            .columns = source->columns,
+            .rows = source->rows,
+            .first_layer = (uint32_t)first,
+            .strength = {layer->white.r * layer->intensity, layer->white.g * layer->intensity, layer->white.b * layer->intensity},
+        };
+    }
+}
+
+static void list_animations(const lx_bake *bake, lx_manifest *manifest)
+{
+    static const char *const channels[] = {"light", "color", "intensity"};
+    for (size_t i = 0; bake->animations && i < bake->animations->count; ++i) {
+        const lx_pack_animation *item = &bake->animations->items[i];
+        const lxrt_program *program = &item->program;
+        float duration_s = program->kind == LXRT_PROGRAM_CONSTANT ? 0 : program->period_s;
+        if (program->kind == LXRT_PROGRAM_KEYS) { // the time of the last key
+            const size_t width = item->channel == LX_PACK_CHANNEL_INTENSITY ? 1 : 3;
+            const size_t stride = 1 + width * (program->interpolation == LXRT_CUBIC ? 3 : 1);
+            duration_s = program->keys[stride * (program->key_count - 1)];
+        }
+        manifest->animations[manifest->animation_count++] = (lx_manifest_animation){
+            .name = item->name,
+            .layer = item->layer,
+            .program = lx_program_name((lx_program_kind)program->kind),
+            .channel = channels[item->channel],
+            .duration_s = duration_s,
+        };
+    }
+}
+
 static lx_result describe(const lx_bake *bake, lx_manifest *manifest, lx_error *error)
 {
     const lx_atlas *atlas = bake->atlas;
@@ -92,6 +135,8 @@ static lx_result describe(const lx_bake *bake, lx_manifest *manifest, lx_error *
         .layers = lx_calloc_array(bake->layer_count, sizeof *manifest->layers),
         .page_count = atlas->page_count,
         .layer_count = bake->layer_count,
+        .monitors = lx_calloc_array(bake->source_count, sizeof *manifest->monitors),
+        .animations = lx_calloc_array(bake->animations ? bake->animations->count : 0, sizeof *manifest->animations),
         .bake = {
             .samples = bake->desc.samples,
             .bounces = bake->desc.direct_only ? 0 : bake->desc.transport.bounces,
@@ -99,10 +144,11 @@ static lx_result describe(const lx_bake *bake, lx_manifest *manifest, lx_error *
             .seed = bake->desc.transport.seed,
             .isa = bake->tracer ? lx_tracer_isa(bake->tracer) : "",
             .seconds = bake->summary.seconds,
+            .stages = bake->summary.stages,
             .threads = bake->scene->context ? lx_pool_worker_count(bake->scene->context->pool) : 0,
         },
     };
-    if (!manifest->pages || !manifest->layers) return lx_fail_memory(error, "luxel.json");
+    if (!manifest->pages || !manifest->layers || !manifest->monitors || !manifest->animations) return lx_fail_memory(error, "luxel.json");
     for (uint32_t page = 0; page < atlas->page_count; ++page) {
         size_t covered = 0;
         for (size_t i = 0; i < texel_count; ++i) covered += bake->texel_coverage[page * texel_count + i] != 0;
@@ -121,6 +167,8 @@ static lx_result describe(const lx_bake *bake, lx_manifest *manifest, lx_error *
             .scale = 1,
         };
     }
+    list_monitors(bake, manifest);
+    list_animations(bake, manifest);
     return LX_OK;
 }
 
@@ -190,6 +238,7 @@ typedef struct pack_tables {
     lx_pack_layer *layers;
     lx_pack_source *sources;
     lx_pack_rect *rects;
+    lx_pack_monitor *monitors;
     float *coverage;
     uint32_t source_count, rect_count;
 } pack_tables;
@@ -199,6 +248,7 @@ static void pack_tables_release(pack_tables *tables)
     lx_free(tables->layers);
     lx_free(tables->sources);
     lx_free(tables->rects);
+    lx_free(tables->monitors);
     lx_free(tables->coverage);
 }
 
@@ -248,10 +298,11 @@ static lx_result begin_pack(const lx_bake *bake, const lx_manifest *manifest, co
         .layers = lx_calloc_array(bake->layer_count, sizeof *tables.layers),
         .sources = lx_calloc_array(bake->source_count, sizeof *tables.sources),
         .rects = lx_calloc_array(bake->scene->instance_count, sizeof *tables.rects),
+        .monitors = lx_calloc_array(manifest->monitor_count, sizeof *tables.monitors),
         .coverage = lx_calloc_array(manifest->page_count, sizeof *tables.coverage),
     };
     lx_result result = LX_OK;
-    if (!tables.layers || !tables.sources || !tables.rects || !tables.coverage) {
+    if (!tables.layers || !tables.sources || !tables.rects || !tables.monitors || !tables.coverage) {
         result = lx_fail_memory(error, "luxel.pack");
         goto cleanup;
     }
@@ -268,6 +319,12 @@ static lx_result begin_pack(const lx_bake *bake, const lx_manifest *manifest, co
         };
     }
     for (uint32_t i = 0; i < manifest->page_count; ++i) tables.coverage[i] = manifest->pages[i].coverage;
+    for (uint32_t i = 0; i < manifest->monitor_count; ++i) {
+        const lx_manifest_monitor *m = &manifest->monitors[i];
+        tables.monitors[i] = (lx_pack_monitor){.name = m->name, .node = m->node, .material = m->material, .columns = m->columns,
+                                               .rows = m->rows, .first_layer = m->first_layer,
+                                               .strength = {m->strength[0], m->strength[1], m->strength[2]}};
+    }
     list_sources(bake, &tables);
     list_rects(bake, &tables);
     const lx_pack_desc desc = {
@@ -281,6 +338,10 @@ static lx_result begin_pack(const lx_bake *bake, const lx_manifest *manifest, co
         .source_count = tables.source_count,
         .rects = tables.rects,
         .rect_count = tables.rect_count,
+        .monitors = tables.monitors,
+        .monitor_count = manifest->monitor_count,
+        .animations = bake->animations ? bake->animations->items : NULL,
+        .animation_count = bake->animations ? (uint32_t)bake->animations->count : 0,
     };
     LX_TRY(lx_pack_begin(&desc, out, error));
 cleanup:

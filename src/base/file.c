@@ -131,6 +131,111 @@ cleanup:
     return result;
 }
 
+// ---- files below a folder
+
+void lx_open_file_close(lx_open_file *file)
+{
+    if (file->handle >= 0) close(file->handle);
+    file->handle = -1;
+}
+
+// Opens name after name, so that no link on the way is followed.
+static int open_below(int folder, const char *path)
+{
+    int parent = folder;
+    for (const char *name = path;;) {
+        char part[NAME_MAX + 1];
+        const size_t length = strcspn(name, "/");
+        if (length == 0 || length > NAME_MAX || strspn(name, ".") >= length) { // all dots: no file of anyone's is called so
+            errno = length > NAME_MAX ? ENAMETOOLONG : ENOENT;
+            break;
+        }
+        memcpy(part, name, length);
+        part[length] = '\0';
+        const bool last = name[length] == '\0';
+        const int handle = openat(parent, part, O_RDONLY | O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK | (last ? 0 : O_DIRECTORY));
+        const int code = errno;
+        if (parent != folder) close(parent);
+        errno = code;
+        if (last || handle < 0) return handle;
+        parent = handle;
+        name += length + 1;
+    }
+    const int code = errno;
+    if (parent != folder) close(parent);
+    errno = code;
+    return -1;
+}
+
+lx_result lx_file_open_below(const char *folder, const char *path, lx_open_file *out, lx_error *error)
+{
+    const int root = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (root < 0) return fail_errno(error, "cannot read");
+    const int handle = open_below(root, path);
+    const int code = errno;
+    close(root);
+    errno = code;
+    if (handle < 0) return errno == ELOOP ? lx_fail(error, LX_ERROR_FORMAT, "is a symbolic link") : fail_errno(error, "cannot read");
+    struct stat info;
+    const bool known = fstat(handle, &info) == 0;
+    if (!known || !S_ISREG(info.st_mode)) {
+        const lx_result result = known ? lx_fail(error, LX_ERROR_FORMAT, "cannot read: not a regular file") : fail_errno(error, "cannot read");
+        close(handle);
+        return result;
+    }
+    *out = (lx_open_file){
+        .handle = handle,
+        .size = (uint64_t)info.st_size,
+        .number = (uint64_t)info.st_ino,
+        .modified_ns = (int64_t)info.st_mtim.tv_sec * 1000000000 + info.st_mtim.tv_nsec,
+    };
+    return LX_OK;
+}
+
+static bool write_all(int file, const char *data, size_t size)
+{
+    while (size > 0) {
+        const ssize_t count = write(file, data, size);
+        if (count < 0 && errno == EINTR) continue;
+        if (count <= 0) return false;
+        data += count;
+        size -= (size_t)count;
+    }
+    return true;
+}
+
+lx_result lx_open_file_copy(const lx_open_file *file, const char *path, lx_error *error)
+{
+    enum { chunk_bytes = 1 << 20 };
+    lx_result result = LX_OK;
+    int out = -1;
+    char *chunk = lx_malloc_array(chunk_bytes, 1);
+    if (!chunk) return lx_fail_memory(error, "copy");
+    out = open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0666);
+    bool ok = out >= 0;
+    for (ssize_t count = 1; ok && count != 0;) {
+        count = read(file->handle, chunk, chunk_bytes);
+        if (count < 0 && errno == EINTR) continue;
+        if (count < 0) {
+            result = fail_errno(error, "cannot read");
+            goto cleanup;
+        }
+        ok = write_all(out, chunk, (size_t)count);
+    }
+    ok = ok && fsync(out) == 0;
+    if (!ok) result = lx_fail(error, LX_ERROR_IO, "cannot write: %s", strerror(errno));
+cleanup:
+    if (out >= 0) close(out);
+    lx_free(chunk);
+    return result;
+}
+
+uint64_t lx_file_bytes(const char *path)
+{
+    struct stat info;
+    return stat(path, &info) == 0 && S_ISREG(info.st_mode) ? (uint64_t)info.st_size : 0;
+}
+
 bool lx_path_exists(const char *path)
 {
     struct stat info;
@@ -288,6 +393,54 @@ lx_result lx_folder_list(const char *path, void (*func)(void *user, const char *
     }
     lx_free(names);
     return result;
+}
+
+typedef struct folder_walk {
+    const char *folder;
+    lx_folder_visit func;
+    void *user;
+    const char *below; // "" at first; else with a slash at its end
+    int depth;
+    lx_result result;
+    lx_error *error;
+} folder_walk;
+
+static void walk_entry(void *user, const char *name)
+{
+    folder_walk *walk = user;
+    char *relative = NULL, *path = NULL;
+    if (walk->result != LX_OK) return;
+    relative = lx_format("%s%s", walk->below, name);
+    path = relative ? lx_path_join(walk->folder, relative) : NULL;
+    if (!path) {
+        walk->result = lx_fail_memory(walk->error, "folder listing");
+    } else {
+        const bool is_folder = lx_path_is_folder(path) && !lx_path_is_link(path);
+        walk->result = walk->func(walk->user, relative, is_folder, walk->error);
+        if (walk->result == LX_OK && is_folder) {
+            char *below = lx_format("%s/", relative);
+            folder_walk inner = *walk;
+            inner.below = below;
+            inner.depth = walk->depth + 1;
+            if (!below)
+                walk->result = lx_fail_memory(walk->error, "folder listing");
+            else if (inner.depth > 64)
+                walk->result = lx_fail(walk->error, LX_ERROR_LIMIT, "%s: folders in folders, more than 64 deep", path);
+            else
+                walk->result = lx_folder_list(path, walk_entry, &inner, walk->error);
+            if (walk->result == LX_OK) walk->result = inner.result;
+            lx_free(below);
+        }
+    }
+    lx_free(relative);
+    lx_free(path);
+}
+
+lx_result lx_folder_walk(const char *folder, lx_folder_visit func, void *user, lx_error *error)
+{
+    folder_walk walk = {.folder = folder, .func = func, .user = user, .below = "", .error = error};
+    const lx_result result = lx_folder_list(folder, walk_entry, &walk, error);
+    return result == LX_OK ? walk.result : result;
 }
 
 bool lx_is_terminal(FILE *stream)

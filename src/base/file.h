@@ -19,6 +19,26 @@ lx_result lx_file_read(const char *path, size_t limit, lx_bytes *out, lx_error *
 /// Writes to a temporary file beside `path`, flushes it to disk and renames it, so that `path` holds the old or the new content.
 lx_result lx_file_write(const char *path, const void *data, size_t size, lx_error *error);
 
+/// A file that was opened for reading.
+typedef struct lx_open_file {
+    int handle; ///< -1: none.
+    uint64_t size;
+    uint64_t number;      ///< Tells files of one disk apart,
+    int64_t modified_ns;  ///< and this one content from another. Since 1970.
+} lx_open_file;
+
+/// Opens the regular file `folder`/`path`. `path` is relative, one name or several with single slashes between; no name may be "." or
+/// "..", and none below `folder` may be a symbolic link: what is opened lies in the folder, whoever else changes it meanwhile. `folder`
+/// itself may be a link. Messages do not repeat the path.
+lx_result lx_file_open_below(const char *folder, const char *path, lx_open_file *out, lx_error *error);
+/// Legal on closed ones.
+void lx_open_file_close(lx_open_file *file);
+/// Writes all of it to a new file at `path` and flushes it to disk; `file` is read from where it stands.
+lx_result lx_open_file_copy(const lx_open_file *file, const char *path, lx_error *error);
+
+/// Size of a regular file; 0 if there is none.
+uint64_t lx_file_bytes(const char *path);
+
 bool lx_path_exists(const char *path);
 bool lx_path_is_folder(const char *path);
 bool lx_path_is_link(const char *path);
@@ -42,6 +62,11 @@ lx_result lx_folder_swap(const char *fresh, const char *path, lx_error *error);
 
 /// Calls `func` for every name in the folder except . and .., sorted by bytes.
 lx_result lx_folder_list(const char *path, void (*func)(void *user, const char *name), void *user, lx_error *error);
+
+/// Calls `func` for everything below a folder, sorted, each folder before what is in it: `path` is relative to the folder. Links are not
+/// followed: they count as files. The first result other than LX_OK ends it and is returned.
+typedef lx_result (*lx_folder_visit)(void *user, const char *path, bool is_folder, lx_error *error);
+lx_result lx_folder_walk(const char *folder, lx_folder_visit func, void *user, lx_error *error);
 
 bool lx_is_terminal(FILE *stream);
 /// Columns of the terminal on stderr, 80 if unknown.

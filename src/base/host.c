@@ -1,3 +1,4 @@
+#define _GNU_SOURCE // POSIX_SPAWN_SETSID
 #include "luxel/host.h"
 
 #include "base/clock.h"
@@ -6,9 +7,17 @@
 #include "base/memory.h"
 
 #include <errno.h>
+#include <fcntl.h>
+#include <math.h>
+#include <signal.h>
+#include <spawn.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <time.h>
 #include <unistd.h>
+
+extern char **environ;
 
 bool lx_host_stderr_is_terminal(void)
 {
@@ -53,4 +62,93 @@ lx_result lx_host_check_output(const char *path, lx_error *error)
         result = lx_fail(error, LX_ERROR_IO, "%s: cannot write: folder %s: %s", path, folder, strerror(errno));
     lx_free(folder);
     return result;
+}
+
+void lx_host_sleep(double seconds)
+{
+    const struct timespec time = {(time_t)seconds, (long)(fmod(seconds, 1.0) * 1e9)};
+    nanosleep(&time, NULL);
+}
+
+// ---- the viewer
+
+static bool holds_index(const char *folder)
+{
+    char *path = lx_path_join(folder, "index.html");
+    const bool found = path && lx_file_bytes(path) > 0;
+    lx_free(path);
+    return found;
+}
+
+static lx_result put_path(const char *path, char *out, size_t size, lx_error *error)
+{
+    if (strlen(path) >= size) return lx_fail(error, LX_ERROR_LIMIT, "%s: the path is too long", path);
+    strcpy(out, path);
+    return LX_OK;
+}
+
+lx_result lx_host_find_viewer(char *out, size_t size, lx_error *error)
+{
+    static const char *const places[] = {"viewer", "../share/luxel/viewer"};
+    const char *chosen = getenv("LUXEL_VIEWER");
+    if (chosen && *chosen) {
+        if (holds_index(chosen)) return put_path(chosen, out, size, error);
+        return lx_fail(error, LX_ERROR_FORMAT, "LUXEL_VIEWER: %s holds no index.html", chosen);
+    }
+    char program[4096];
+    const ssize_t length = readlink("/proc/self/exe", program, sizeof program - 1);
+    if (length < 0) return lx_fail(error, LX_ERROR_IO, "cannot tell where this program lies: %s", strerror(errno));
+    program[length] = '\0';
+    lx_result result = LX_ERROR_FORMAT;
+    char *folder = lx_path_folder(program);
+    for (size_t i = 0; folder && result == LX_ERROR_FORMAT && i < sizeof places / sizeof *places; ++i) {
+        char *path = lx_path_join(folder, places[i]);
+        if (path && holds_index(path)) result = put_path(path, out, size, error);
+        lx_free(path);
+    }
+    if (result == LX_ERROR_FORMAT)
+        lx_fail(error, result, "the viewer is not there: no index.html in %s/viewer; script/build makes it where Node.js is installed, and "
+                "LUXEL_VIEWER names one elsewhere", folder ? folder : "");
+    lx_free(folder);
+    return result;
+}
+
+// ---- the browser
+
+static bool is_set(const char *variable)
+{
+    const char *value = getenv(variable);
+    return value && *value;
+}
+
+bool lx_host_has_display(void)
+{
+    return is_set("DISPLAY") || is_set("WAYLAND_DISPLAY");
+}
+
+// In a session of its own, so that Ctrl-C here does not reach it, and silent: browsers print much.
+bool lx_host_open_browser(const char *url)
+{
+    char *arguments[] = {"xdg-open", (char *)url, NULL};
+    posix_spawn_file_actions_t files;
+    posix_spawnattr_t attributes;
+    if (posix_spawn_file_actions_init(&files) != 0) return false;
+    if (posix_spawnattr_init(&attributes) != 0) {
+        posix_spawn_file_actions_destroy(&files);
+        return false;
+    }
+    sigset_t caught;
+    sigemptyset(&caught);
+    sigaddset(&caught, SIGINT);
+    sigaddset(&caught, SIGTERM);
+    pid_t child;
+    const bool started = posix_spawn_file_actions_addopen(&files, STDIN_FILENO, "/dev/null", O_RDONLY, 0) == 0 &&
+                         posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, "/dev/null", O_WRONLY, 0) == 0 &&
+                         posix_spawn_file_actions_addopen(&files, STDERR_FILENO, "/dev/null", O_WRONLY, 0) == 0 &&
+                         posix_spawnattr_setsigdefault(&attributes, &caught) == 0 &&
+                         posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSID | POSIX_SPAWN_SETSIGDEF) == 0 &&
+                         posix_spawnp(&child, arguments[0], &files, &attributes, arguments, environ) == 0;
+    posix_spawnattr_destroy(&attributes);
+    posix_spawn_file_actions_destroy(&files);
+    return started;
 }

@@ -29,7 +29,7 @@ typedef struct bake_options {
     const char *integrator;
     int quality, layers, encoding, light_units;
     uint32_t samples; // 0: what the quality says
-    bool no_preview, json;
+    bool no_preview, no_report, json;
 } bake_options;
 
 static int parse(const cli_command *command, int argc, char **argv, bake_options *o)
@@ -43,6 +43,7 @@ static int parse(const cli_command *command, int argc, char **argv, bake_options
         {.name = "encoding", .argument = "default|rgb9e5|half", .kind = CLI_CHOICE, .target = &o->encoding,
          .help = "of these files (default: rgb9e5 in KTX2, 32-bit float in EXR)"},
         {.name = "no-preview", .kind = CLI_FLAG, .target = &o->no_preview, .help = "do not render preview.png"},
+        {.name = "no-report", .kind = CLI_FLAG, .target = &o->no_report, .help = "do not write report.html"},
         {.name = "json", .kind = CLI_FLAG, .target = &o->json, .help = "summary as JSON"},
         {.kind = CLI_HEADING, .help = "Lightmap"},
         {.name = "page-size", .argument = "N", .kind = CLI_UINT, .target = &o->atlas.page_size, .min = 16, .max = 4096,
@@ -98,6 +99,7 @@ static int parse(const cli_command *command, int argc, char **argv, bake_options
     o->bake.combined = o->layers == 1;
     o->save.encoding = (lx_encoding)o->encoding;
     o->save.preview = !o->no_preview;
+    o->save.report = !o->no_report;
     o->load.light_units = o->light_units == 1 ? LX_LIGHT_UNITS_BLENDER : LX_LIGHT_UNITS_GLTF;
     return CLI_GO_ON;
 }
@@ -130,6 +132,8 @@ static void print_summary(const bake_options *o, const lx_bake_summary *s)
     printf("  time      %s of baking, %s in all; %s rays, %s rays/s; %s of memory\n", seconds, total_seconds, rays, rate,
            memory);
     printf("  pack      %s/luxel.pack, %s\n", o->output, pack);
+    cli_print_budget(&s->budget);
+    if (o->save.report) printf("  report    %s/report.html\n", o->output);
     if (o->save.preview) printf("  preview   %s/preview.png, exposure %+.2f EV\n", o->output, (double)s->view_ev);
     if (s->invalid_count)
         printf("  note      %" PRIu64 " of %" PRIu64 " texels lie inside solid geometry and were filled from neighbours\n",
@@ -138,10 +142,22 @@ static void print_summary(const bake_options *o, const lx_bake_summary *s)
         printf("  warnings  %zu, printed above\n", o->session.warning_count);
 }
 
+static json_t *budget_json(const lx_budget *b)
+{
+    return json_pack("{s:I, s:I, s:I, s:I, s:I}", "ram", (json_int_t)b->ram, "accumulator", (json_int_t)b->accumulator, "gpu_composed",
+                     (json_int_t)b->gpu_composed, "gpu_layers", (json_int_t)b->gpu_layers, "dense", (json_int_t)b->dense);
+}
+
+static json_t *stages_json(const lx_stage_seconds *s)
+{
+    return json_pack("{s:f, s:f, s:f, s:f, s:f, s:f, s:f}", "import", s->import, "unwrap", s->unwrap, "luxels", s->luxels, "bake", s->bake,
+                     "post", s->post, "save", s->save, "preview", s->preview);
+}
+
 static int print_json(const bake_options *o, const lx_bake_summary *s)
 {
     json_t *const root = json_pack(
-        "{s:s, s:s, s:I, s:I, s:f, s:f, s:I, s:I, s:I, s:o, s:I, s:I, s:I, s:I, s:f, s:f, s:f, s:I, s:I, s:s?, s:f, s:I}",
+        "{s:s, s:s, s:I, s:I, s:f, s:f, s:I, s:I, s:I, s:o, s:I, s:I, s:I, s:I, s:f, s:f, s:f, s:I, s:I, s:o, s:o, s:s?, s:s?, s:f, s:I}",
         "scene", o->scene_path, "folder", o->output,
         "pages", (json_int_t)s->page_count, "page_size", (json_int_t)s->page_size,
         "coverage", (double)s->coverage, "texels_per_meter", (double)s->texels_per_m,
@@ -154,7 +170,8 @@ static int print_json(const bake_options *o, const lx_bake_summary *s)
         "seconds", s->seconds, "total_seconds", lx_host_seconds() - o->session.start_seconds,
         "rays_per_second", s->seconds > 0.0 ? (double)s->ray_count / s->seconds : 0.0,
         "pack_bytes", (json_int_t)s->pack_bytes, "peak_memory_bytes", (json_int_t)lx_host_peak_memory(),
-        "preview", o->save.preview ? "preview.png" : NULL, "view_ev", (double)s->view_ev,
+        "memory", budget_json(&s->budget), "stages", stages_json(&s->stages),
+        "report", o->save.report ? "report.html" : NULL, "preview", o->save.preview ? "preview.png" : NULL, "view_ev", (double)s->view_ev,
         "warnings", (json_int_t)o->session.warning_count);
     if (!root) {
         fprintf(stderr, "luxel: cannot write the summary as JSON: names are no UTF-8, or memory is short\n");
@@ -218,7 +235,7 @@ const cli_command cli_bake = {
     .usage = "SCENE.glb -o OUT [options]",
     .summary = "bake the light of a glTF scene into a folder",
     .about = "Bakes the light of a glTF scene (.glb or .gltf) into lightmaps, one layer per light source, and writes "
-             "the folder OUT: scene.glb with lightmap coordinates, luxel.json, luxel.pack, preview.png.",
+             "the folder OUT: scene.glb with lightmap coordinates, luxel.json, luxel.pack, preview.png, report.html.",
     .examples = "  luxel bake room.glb -o room.baked\n"
                 "  luxel bake room.glb -o room.baked --quality draft --page-size 512\n"
                 "  luxel bake house.glb -o house.baked --sky noon.hdr --max-pages 4\n"

@@ -7,6 +7,19 @@
 
 #include <stdio.h>
 
+// Sizes as people read them.
+static void write_out_bytes(json_t *object)
+{
+    const char *key;
+    json_t *value;
+    json_object_foreach(object, key, value)
+        if (json_is_integer(value)) {
+            char text[32];
+            cli_format_bytes(text, (uint64_t)json_integer_value(value));
+            json_object_set_new(object, key, json_string(text)); // an existing key: legal while iterating
+        }
+}
+
 // The library's description with the warnings and notes of loading added.
 static int print(const cli_session *session, const char *text, bool as_json)
 {
@@ -24,6 +37,8 @@ static int print(const cli_session *session, const char *text, bool as_json)
             json_dumpf(root, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
             putchar('\n');
         } else {
+            write_out_bytes(json_object_get(root, "memory"));
+            write_out_bytes(json_object_get(root, "sizes"));
             cli_print_document(root);
         }
         status = CLI_DONE;

@@ -10,5 +10,7 @@ extern const cli_command cli_inspect;
 extern const cli_command cli_compose;
 extern const cli_command cli_irradiance;
 extern const cli_command cli_compare;
+extern const cli_command cli_view;
+extern const cli_command cli_export_web;
 
 #endif

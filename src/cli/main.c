@@ -7,8 +7,8 @@
 #include <stdio.h>
 #include <string.h>
 
-static const cli_command *const commands[] = {&cli_bake,       &cli_render,  &cli_inspect,
-                                              &cli_compose, &cli_irradiance, &cli_compare};
+static const cli_command *const commands[] = {&cli_bake,    &cli_render,     &cli_view,    &cli_inspect,
+                                              &cli_compose, &cli_irradiance, &cli_compare, &cli_export_web};
 
 static const cli_command *find_command(const char *name)
 {

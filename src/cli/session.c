@@ -162,6 +162,17 @@ void cli_format_bytes(char out[32], uint64_t bytes)
     snprintf(out, 32, unit == 0 ? "%.0f %s" : "%.1f %s", value, units[unit]);
 }
 
+void cli_print_budget(const lx_budget *budget)
+{
+    char ram[32], accumulator[32], composed[32], layers[32];
+    cli_format_bytes(ram, budget->ram);
+    cli_format_bytes(accumulator, budget->accumulator);
+    cli_format_bytes(composed, budget->gpu_composed);
+    cli_format_bytes(layers, budget->gpu_layers);
+    printf("  memory    %s in RAM at run time; %s more to add only what changes\n", ram, accumulator);
+    printf("  GPU       %s composed on the CPU, or %s as layers\n", composed, layers);
+}
+
 void cli_format_count(char out[32], double count)
 {
     if (count >= 1e9)

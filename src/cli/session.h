@@ -71,6 +71,8 @@ void cli_extension(const char *path, char out[8]);
 
 /// One size, in the unit that fits: "4.2 MiB".
 void cli_format_bytes(char out[32], uint64_t bytes);
+/// Two lines of a summary: what a baked folder costs at run time.
+void cli_print_budget(const lx_budget *budget);
 /// A number with k, M or G.
 void cli_format_count(char out[32], double count);
 /// "0.4 s", "1 m 05 s", "2 h 03 m".

@@ -56,6 +56,7 @@ lx_result lx_image_load(const char *path, lx_image *out, lx_error *error);
 
 /// Encoders; `out` is owned by the caller. EXR channels are named Y, Y A, R G B or R G B A.
 lx_result lx_png_encode(const lx_image *image, lx_bytes *out, lx_error *error);                 ///< U8 only.
+lx_result lx_jpeg_encode(const lx_image *image, int quality, lx_bytes *out, lx_error *error);   ///< U8, 3 channels; quality 1…100.
 lx_result lx_hdr_encode(const lx_image *image, lx_bytes *out, lx_error *error);                 ///< F32, 3 channels; RLE.
 lx_result lx_exr_encode(const lx_image *image, bool half_float, lx_bytes *out, lx_error *error); ///< F32; ZIP.
 

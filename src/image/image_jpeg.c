@@ -9,6 +9,8 @@
 #include <jerror.h>
 #include <jpeglib.h>
 #include <setjmp.h>
+#include <stdlib.h>
+#include <string.h>
 
 // A progressive file can ask for any number of passes over the whole image; encoders write about ten.
 enum { max_scans = 200 };
@@ -173,5 +175,70 @@ lx_result lx_jpeg_decode(const void *data, size_t size, uint64_t max_pixels, lx_
         lx_image_release(&reader.image);
     jpeg_destroy_decompress(&reader.info);
     lx_free(reader.row);
+    return result;
+}
+
+// ---- writing
+
+struct jpeg_writer {
+    struct jpeg_compress_struct info;
+    struct jpeg_error_mgr errors;
+    jmp_buf escape;
+    char message[JMSG_LENGTH_MAX];
+    unsigned char *data; // malloc'ed by the library
+    unsigned long size;
+};
+
+static void on_write_error(j_common_ptr info)
+{
+    struct jpeg_writer *writer = info->client_data;
+    info->err->format_message(info, writer->message);
+    longjmp(writer->escape, 1);
+}
+
+static lx_result encode_guarded(struct jpeg_writer *writer, const lx_image *image, int quality, lx_error *error)
+{
+    j_compress_ptr info = &writer->info;
+    info->err = jpeg_std_error(&writer->errors);
+    info->client_data = writer;
+    writer->errors.error_exit = on_write_error;
+    writer->errors.output_message = no_output;
+    if (setjmp(writer->escape)) return lx_fail(error, LX_ERROR_BACKEND, "JPEG: %s", writer->message);
+
+    jpeg_create_compress(info);
+    jpeg_mem_dest(info, &writer->data, &writer->size);
+    info->image_width = image->width;
+    info->image_height = image->height;
+    info->input_components = 3;
+    info->in_color_space = JCS_RGB;
+    jpeg_set_defaults(info);
+    jpeg_set_quality(info, quality, TRUE);
+    info->optimize_coding = TRUE;
+    jpeg_start_compress(info, TRUE);
+    while (info->next_scanline < info->image_height) {
+        JSAMPROW row = image->u8 + (size_t)info->next_scanline * image->width * 3;
+        jpeg_write_scanlines(info, &row, 1);
+    }
+    jpeg_finish_compress(info);
+    return LX_OK;
+}
+
+lx_result lx_jpeg_encode(const lx_image *image, int quality, lx_bytes *out, lx_error *error)
+{
+    if (image->type != LX_PIXEL_U8 || image->channels != 3)
+        return lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "JPEG: only 8-bit RGB can be written");
+    struct jpeg_writer writer = {0};
+    lx_result result = encode_guarded(&writer, image, quality, error);
+    if (result == LX_OK) {
+        lx_bytes bytes = {.data = lx_malloc_array(writer.size, 1), .size = writer.size};
+        if (bytes.data) {
+            memcpy(bytes.data, writer.data, writer.size);
+            *out = bytes;
+        } else {
+            result = lx_fail_memory(error, "JPEG");
+        }
+    }
+    jpeg_destroy_compress(&writer.info);
+    free(writer.data);
     return result;
 }

@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "math/sobol.h"
+#include "render/seen.h"
 
 #include <string.h>
 
@@ -61,20 +62,14 @@ static lx_rgb page_texel(const float *page, uint32_t size, int64_t x, int64_t y)
 static bool lightmap_at(const lx_picture *picture, const lx_hit *hit, lx_rgb *out)
 {
     const lx_atlas *atlas = picture->atlas;
-    if (!atlas) return false;
-    const lx_surface *surface = &lx_tracer_scene(picture->tracer)->surfaces[hit->surface];
-    const lx_atlas_rect *rect = &atlas->rects[surface->instance];
-    const lx_vec2 *uv = atlas->primitives[surface->primitive].corner_uv;
-    if (!rect->used || !uv) return false;
-    uv += 3 * (size_t)hit->triangle;
-    const float w = 1 - hit->u - hit->v;
-    const float u = (w * uv[0].x + hit->u * uv[1].x + hit->v * uv[2].x) * rect->scale[0] + rect->offset[0];
-    const float v = (w * uv[0].y + hit->u * uv[1].y + hit->v * uv[2].y) * rect->scale[1] + rect->offset[1];
+    uint32_t page_index;
+    lx_vec2 uv;
+    if (!atlas || !lx_lightmap_place(lx_tracer_scene(picture->tracer), atlas, hit, &page_index, &uv)) return false;
     const uint32_t size = atlas->page_size;
-    const float x = lx_clamp(u, 0, 1) * (float)size - 0.5f, y = lx_clamp(v, 0, 1) * (float)size - 0.5f;
+    const float x = lx_clamp(uv.x, 0, 1) * (float)size - 0.5f, y = lx_clamp(uv.y, 0, 1) * (float)size - 0.5f;
     const float x_floor = floorf(x), y_floor = floorf(y), fx = x - x_floor, fy = y - y_floor;
     const int64_t ix = (int64_t)x_floor, iy = (int64_t)y_floor;
-    const float *page = picture->pages[rect->page];
+    const float *page = picture->pages[page_index];
     const lx_rgb top = lx_rgb_add(lx_rgb_scale(page_texel(page, size, ix, iy), 1 - fx),
                                   lx_rgb_scale(page_texel(page, size, ix + 1, iy), fx));
     const lx_rgb bottom = lx_rgb_add(lx_rgb_scale(page_texel(page, size, ix, iy + 1), 1 - fx),
@@ -90,7 +85,12 @@ static lx_rgb shown_emission(const lx_picture *picture, const lx_hit *hit, const
     const lx_surface *surface = &scene->surfaces[hit->surface];
     const lx_material *m = &scene->materials[surface->material];
     if (m->unlit) return s->emission;
-    if (surface->source >= 0) return lx_rgb_mul(s->emission, picture->uses[surface->source].weight);
+    if (surface->source >= 0) {
+        const lx_source_use *use = &picture->uses[surface->source];
+        const lx_rgb strength = use->cells ? lx_rgb_mul(use->weight, use->cells[lx_tracer_cell_at(picture->tracer, hit->surface, hit->triangle, hit->u, hit->v)])
+                                           : use->weight;
+        return lx_rgb_mul(s->emission, strength);
+    }
     return lx_rgb_mul(s->emission, lx_rgb_scale(m->emissive_factor, m->emissive_strength));
 }
 

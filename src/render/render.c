@@ -40,7 +40,7 @@ lx_result lx_render_scene(const lx_scene *scene, const lx_render_desc *desc, con
     lx_tracer *tracer = NULL;
     lx_source_use *uses = NULL;
     lx_view_rays view;
-    LX_TRY(lx_tracer_create(scene, &desc->transport, true, &tracer, error));
+    LX_TRY(lx_tracer_create(scene, &desc->transport, true, NULL, &tracer, error));
     LX_TRY(lx_view_choose(tracer, desc, &view, error));
     uses = lx_uses_combined(tracer);
     if (!uses) {
@@ -60,21 +60,71 @@ cleanup:
 
 // ---- baked folders -------------------------------------------------------------------------------------------------------
 
-// Every source at its layer's colour now, in layer 0. Sources the bake did not know (realtime ones) keep their authored strength.
-static lx_source_use *current_uses(const lx_baked *baked, const lx_tracer *tracer, bool mixed_only)
+// Colours of now: every source at its layer's colour, in layer 0. Sources the bake did not know (realtime ones) keep their authored strength.
+// A monitor shows its own picture until one of its cells gets another colour; then all its cells.
+typedef struct current_colors {
+    lx_source_use *uses, *mixed_uses; // all sources; those alone whose direct part is not in the lightmap
+    bool *cells;                      // [source of the scene] the monitor shows cells
+    lx_rgb *cell_colors;              // of all such monitors
+} current_colors;
+
+static void release_colors(current_colors *colors)
+{
+    lx_free(colors->uses);
+    lx_free(colors->mixed_uses);
+    lx_free(colors->cells);
+    lx_free(colors->cell_colors);
+}
+
+static lx_result choose_cells(const lx_baked *baked, current_colors *out, lx_error *error)
+{
+    const lx_scene *scene = baked->scene;
+    size_t total = 0;
+    out->cells = lx_calloc_array(scene->source_count, sizeof *out->cells);
+    if (!out->cells) return lx_fail_memory(error, "picture");
+    for (uint32_t i = 0; i < scene->source_count; ++i) {
+        const lx_manifest_monitor *monitor = lx_baked_monitor(baked, i);
+        out->cells[i] = monitor && lx_baked_monitor_shows_cells(baked, monitor);
+        if (out->cells[i]) total += lx_source_cell_count(&scene->sources[i]);
+    }
+    out->cell_colors = lx_calloc_array(total, sizeof *out->cell_colors);
+    return out->cell_colors ? LX_OK : lx_fail_memory(error, "picture");
+}
+
+static void use_cells(const lx_baked *baked, uint32_t source, lx_source_use *use, lx_rgb *colors)
+{
+    const lx_manifest_monitor *monitor = lx_baked_monitor(baked, source);
+    for (uint32_t cell = 0; cell < monitor->columns * monitor->rows; ++cell) {
+        float c[3];
+        lx_baked_get_layer(baked, monitor->first_layer + cell, c);
+        colors[cell] = lx_rgb_of(c[0], c[1], c[2]);
+    }
+    use->weight = baked->uses[source].weight;
+    use->cells = colors;
+}
+
+static lx_result find_colors(const lx_baked *baked, const lx_tracer *tracer, current_colors *out, lx_error *error)
 {
     const uint32_t count = lx_tracer_source_count(tracer), scene_count = baked->scene->source_count;
-    lx_source_use *uses = lx_calloc_array(count, sizeof *uses);
-    if (!uses) return NULL;
+    lx_rgb *next = out->cell_colors;
+    out->uses = lx_calloc_array(count, sizeof *out->uses);
+    out->mixed_uses = lx_calloc_array(count, sizeof *out->mixed_uses);
+    if (!out->uses || !out->mixed_uses) return lx_fail_memory(error, "picture");
     for (uint32_t i = 0; i < count; ++i) {
         const lx_source *source = lx_tracer_source(tracer, i);
         const uint32_t index = i < scene_count ? i : baked->use_count - 1;
         const bool known = baked->uses[index].layer >= 0;
-        uses[i].weight = known ? lx_baked_source_strength(baked, index) : lx_rgb_scale(source->color, source->intensity);
-        uses[i].layer = mixed_only && source->mode != LX_MODE_MIXED ? -1 : 0;
-        uses[i].direct = true;
+        lx_source_use *use = &out->uses[i];
+        *use = (lx_source_use){.layer = 0, .direct = true};
+        use->weight = known ? lx_baked_source_strength(baked, index) : lx_rgb_scale(source->color, source->intensity);
+        if (i < scene_count && out->cells[i]) {
+            use_cells(baked, i, use, next);
+            next += lx_source_cell_count(source);
+        }
+        out->mixed_uses[i] = *use;
+        if (source->mode != LX_MODE_MIXED) out->mixed_uses[i].layer = -1;
     }
-    return uses;
+    return LX_OK;
 }
 
 static bool any_mixed(const lx_scene *scene)
@@ -103,41 +153,34 @@ lx_result lx_render_baked(lx_baked *baked, const lx_render_desc *desc, bool refe
     if (result != LX_OK) return result;
     if (!baked->scene) return lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "the folder was opened without its scene");
     lx_tracer *tracer = NULL;
-    lx_source_use *uses = NULL, *mixed_uses = NULL;
+    current_colors colors = {0};
     float **pages = NULL;
     lx_view_rays view;
     lx_transport_desc transport = desc->transport;
     transport.sky = baked->sky;
     const uint32_t page_count = lx_baked_page_count(baked);
-    LX_TRY(lx_tracer_create(baked->scene, &transport, true, &tracer, error));
+    LX_TRY(choose_cells(baked, &colors, error));
+    LX_TRY(lx_tracer_create(baked->scene, &transport, true, colors.cells, &tracer, error));
     LX_TRY(lx_view_choose(tracer, desc, &view, error));
-    uses = current_uses(baked, tracer, false);
+    LX_TRY(find_colors(baked, tracer, &colors, error));
     pages = lx_calloc_array(page_count, sizeof *pages);
-    if (!uses || !pages) {
+    if (!pages) {
         result = lx_fail_memory(error, "picture");
         goto cleanup;
     }
-    lx_picture picture = {.tracer = tracer, .uses = uses};
+    lx_picture picture = {.tracer = tracer, .uses = colors.uses};
     if (!reference) {
         LX_TRY(compose_pages(baked, pages, error));
         picture.atlas = baked->atlas;
         picture.pages = (const float *const *)pages;
-        if (any_mixed(baked->scene)) {
-            mixed_uses = current_uses(baked, tracer, true);
-            if (!mixed_uses) {
-                result = lx_fail_memory(error, "picture");
-                goto cleanup;
-            }
-            picture.mixed_uses = mixed_uses;
-        }
+        if (any_mixed(baked->scene)) picture.mixed_uses = colors.mixed_uses;
     }
     LX_TRY(lx_picture_render(&picture, &view, desc, progress, out_rgb, error));
     choose_exposure(desc, out_rgb, out_ev);
 cleanup:
     for (uint32_t i = 0; pages && i < page_count; ++i) lx_free(pages[i]);
     lx_free(pages);
-    lx_free(uses);
-    lx_free(mixed_uses);
+    release_colors(&colors);
     lx_tracer_destroy(tracer);
     return result;
 }

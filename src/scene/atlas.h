@@ -36,6 +36,7 @@ struct lx_atlas {
     const lx_scene *scene; ///< Borrowed.
     uint32_t page_size, page_count, padding; ///< page_count 0: nothing takes light.
     float texels_per_m; ///< What came out.
+    double seconds;     ///< What lx_atlas_build took.
     bool scene_atlas;   ///< The file brought one atlas for everything: one page, identity rectangles.
     lx_atlas_primitive *primitives;
     lx_atlas_mesh *meshes;

@@ -46,11 +46,15 @@ static json_t *describe_counts(const lx_scene *scene)
 
 static json_t *describe_source(const lx_source *source)
 {
-    return json_pack("{s:s,s:s,s:s,s:s,s:o,s:o,s:s,s:I,s:o}", "name", source->name, "kind", source_kinds[source->kind],
+    char grid[32];
+    snprintf(grid, sizeof grid, "%ux%u", source->columns, source->rows);
+    return json_pack("{s:s,s:s,s:s,s:s,s:o,s:o,s:s,s:I,s:o,s:o,s:o}", "name", source->name, "kind", source_kinds[source->kind],
                      "layer", source->layer ? source->layer : source->name, "mode", mode_names[source->mode], "color",
                      color(source->color), "intensity", number(source->intensity), "unit", source_units[source->kind],
                      "node", (json_int_t)source->node, "material",
-                     source->material >= 0 ? json_integer(source->material) : json_null());
+                     source->material >= 0 ? json_integer(source->material) : json_null(), "monitor",
+                     source->columns > 0 ? json_string(grid) : json_null(), "animate",
+                     source->animate ? json_string(lx_program_name(source->animate->kind)) : json_null());
 }
 
 static json_t *describe_light(const lx_light *light)
@@ -98,6 +102,17 @@ static json_t *describe_material(const lx_material *material)
     return json;
 }
 
+static json_t *describe_track(const lx_track *track)
+{
+    static const char *const interpolations[] = {"STEP", "LINEAR", "CUBICSPLINE"};
+    static const char *const properties[2][2] = {{"color", "intensity"}, {"emissiveFactor", "emissiveStrength"}};
+    const size_t width = track->channel == LX_TRACK_COLOR ? 3 : 1, stride = 1 + width * (track->interpolation == LX_CUBIC ? 3 : 1);
+    return json_pack("{s:s,s:s,s:I,s:s,s:s,s:I,s:o}", "name", track->name, "object", track->object == LX_TRACK_LIGHT ? "light" : "material",
+                     "index", (json_int_t)track->index, "property", properties[track->object][track->channel], "interpolation",
+                     interpolations[track->interpolation], "keys", (json_int_t)track->key_count, "duration",
+                     number(track->keys[stride * (track->key_count - 1)]));
+}
+
 static json_t *describe_warnings(const lx_scene *scene)
 {
     json_t *list = json_array();
@@ -131,6 +146,7 @@ lx_result lx_scene_describe(const lx_scene *scene, char **out_json, lx_error *er
                       json_pack("{s:o,s:o}", "min", vector(scene->bounds.low), "max", vector(scene->bounds.high))) != 0;
     DESCRIBE_ALL(root, "sources", scene->source_count, scene->sources, describe_source);
     DESCRIBE_ALL(root, "lights", scene->light_count, scene->lights, describe_light);
+    DESCRIBE_ALL(root, "animations", scene->track_count, scene->tracks, describe_track);
     DESCRIBE_ALL(root, "cameras", scene->camera_count, scene->cameras, describe_camera);
     DESCRIBE_ALL(root, "materials", scene->material_count, scene->materials, describe_material);
     failed |= json_object_set_new(root, "warnings", describe_warnings(scene)) != 0;

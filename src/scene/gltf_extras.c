@@ -190,6 +190,45 @@ static lx_result read_color(const key_site *site, const json_t *value, lx_error 
     return LX_OK;
 }
 
+// "16x9": columns, then rows.
+static lx_result read_monitor(const key_site *site, const json_t *value, lx_error *error)
+{
+    (void)error;
+    const char *text = json_string_value(value);
+    uint32_t columns, rows;
+    char extra;
+    if (text && sscanf(text, " %4u%*1[xX]%4u %c", &columns, &rows, &extra) == 2 && columns >= 1 && rows >= 1 &&
+        columns <= lx_most_monitor_cells && rows <= lx_most_monitor_cells && columns * rows <= lx_most_monitor_cells) {
+        site->out->monitor_columns = columns;
+        site->out->monitor_rows = rows;
+    } else {
+        warn(site, "'COLUMNSxROWS' (16x9, say) with 4096 cells at most");
+    }
+    return LX_OK;
+}
+
+static lx_result read_animate(const key_site *site, const json_t *value, lx_error *error)
+{
+    const char *text = json_string_value(value);
+    lx_error reason;
+    lx_program program;
+    if (!text) {
+        warn(site, "a program ('flicker 0.2 low=0.5', say)");
+        return LX_OK;
+    }
+    const lx_result result = lx_program_parse(text, site->strings, &program, &reason);
+    if (result == LX_ERROR_OUT_OF_MEMORY) return lx_fail_memory(error, "programs");
+    if (result != LX_OK) {
+        lx_log_warning(site->log, "%s: %s: %s; ignored", site->object->label, site->key, reason.message);
+        return LX_OK;
+    }
+    lx_program *kept = lx_arena_alloc(site->strings, 1, sizeof *kept);
+    if (!kept) return lx_fail_memory(error, "programs");
+    *kept = program;
+    site->out->animate = kept;
+    return LX_OK;
+}
+
 enum { node = LX_EXTRAS_NODE, light = LX_EXTRAS_LIGHT, material = LX_EXTRAS_MATERIAL };
 
 static const struct {
@@ -208,7 +247,8 @@ static const struct {
     {"luxel_area", node | light, read_area},
     {"luxel_color", node | light, read_color},
     {"luxel_intensity", node | light, read_intensity},
-    {"luxel_monitor", node | material, NULL},
+    {"luxel_monitor", node | material, read_monitor},
+    {"luxel_animate", node | light | material, read_animate},
     {"luxel_probes", node, NULL},
     {"luxel_lightmap", node, NULL}, // what our own export writes
     {"luxel_baked", node | light | material, NULL},
@@ -301,6 +341,11 @@ lx_gltf_extras lx_gltf_extras_merge(lx_gltf_extras first, const lx_gltf_extras *
     if (!first.has_intensity) {
         first.has_intensity = second->has_intensity;
         first.intensity = second->intensity;
+    }
+    if (!first.animate) first.animate = second->animate;
+    if (first.monitor_columns == 0) {
+        first.monitor_columns = second->monitor_columns;
+        first.monitor_rows = second->monitor_rows;
     }
     return first;
 }

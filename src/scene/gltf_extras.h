@@ -21,6 +21,8 @@ typedef struct lx_gltf_extras {
     bool has_color, has_intensity;
     lx_rgb color;    ///< Linear.
     float intensity; ///< Nit.
+    uint32_t monitor_columns, monitor_rows; ///< 0: not set.
+    const lx_program *animate; ///< In the scene's arena; NULL: not set.
 } lx_gltf_extras;
 
 /// Where an object may stand; decides which keys make sense there.

@@ -119,6 +119,7 @@ static lx_result read_scene(lx_gltf_reader *reader, const void *data, size_t siz
     LX_TRY(lx_gltf_load_images(reader, error));
     LX_TRY(lx_gltf_load_lights(reader, error));
     LX_TRY(lx_gltf_load_cameras(reader, error));
+    LX_TRY(lx_gltf_load_tracks(reader, error));
     LX_TRY(lx_gltf_load_sources(reader, error));
     lx_scene_advise(reader->scene, desc->light_units, reader->counts[LX_GLTF_LIGHT] > 0, reader->extras_count > 0);
 cleanup:

@@ -12,6 +12,7 @@
 // A light of the file, before it has a place.
 typedef struct lamp {
     lx_gltf_object object; ///< json NULL: made by luxel_area alone.
+    int32_t file_index;    ///< -1: likewise.
     lx_light_kind kind;
     lx_rgb color;
     float intensity, range, inner_angle, outer_angle;
@@ -76,7 +77,7 @@ cleanup:
 static lx_result read_lamp(lx_gltf_reader *reader, uint32_t index, lamp *out, lx_error *error)
 {
     lx_result result = LX_OK;
-    *out = (lamp){0};
+    *out = (lamp){.file_index = (int32_t)index};
     LX_TRY(lx_gltf_element(reader, LX_GLTF_LIGHT, index, &out->object, error));
     LX_TRY(read_kind(&out->object, &out->kind, error));
     LX_TRY(read_strength(reader, &out->object, out, error));
@@ -121,7 +122,8 @@ static bool make_area(const lx_mat4 *world, const lx_gltf_extras *extras, bool f
     const float area = area_of(light);
     if (!(area > 0) || !isfinite(area)) return false;
     if (from_lamp) {
-        light->intensity /= area; // on-axis intensity I = L · area
+        light->intensity_scale = 1 / area; // on-axis intensity I = L · area
+        light->intensity /= area;
     } else {
         light->color = extras->has_color ? extras->color : lx_rgb_grey(1);
         light->intensity = extras->has_intensity ? extras->intensity : 1;
@@ -166,6 +168,8 @@ static lx_result place_lamp(lx_gltf_reader *reader, uint32_t index, const lx_glt
         .direction = lx_normalize_or(lx_neg(column(&node->world, 2)), (lx_vec3){0, 0, -1}),
         .color = source->color,
         .intensity = source->intensity,
+        .intensity_scale = 1,
+        .file_index = source->file_index,
         .range = source->range,
         .inner_angle = source->inner_angle,
         .outer_angle = source->outer_angle,
@@ -220,6 +224,7 @@ static lx_result find_area_takers(lx_gltf_reader *reader, const lamp *lamps, lx_
 static lx_result load_node_light(lx_gltf_reader *reader, uint32_t index, const lamp *lamps, lx_error *error)
 {
     static const lamp no_lamp = {.kind = LX_LIGHT_POINT,
+                                 .file_index = -1,
                                  .extras = {.mode = -1, .is_static = -1, .transparent = -1, .radius = -1}};
     lx_gltf_object object;
     int32_t light;

@@ -131,7 +131,9 @@ static lx_result read_emission(const lx_gltf_reader *reader, const lx_gltf_objec
     out->emissive_factor = lx_rgb_of(fmaxf(factor[0], 0), fmaxf(factor[1], 0), fmaxf(factor[2], 0));
     const float excess = fmaxf(lx_rgb_max(out->emissive_factor), 1);
     out->emissive_factor = lx_rgb_scale(out->emissive_factor, 1 / excess);
-    out->emissive_strength = fmaxf(strength, 0) * excess * reader->emission_scale;
+    out->factor_scale = 1 / excess;
+    out->strength_scale = excess * reader->emission_scale;
+    out->emissive_strength = fmaxf(strength, 0) * out->strength_scale;
     if (!isfinite(out->emissive_strength))
         return lx_fail(error, LX_ERROR_FORMAT, "%s: emission is infinite", object->label);
 cleanup:
@@ -166,6 +168,9 @@ static lx_result read_authoring(lx_gltf_reader *reader, const lx_gltf_object *ob
     out->mode = extras.mode >= 0 ? (lx_light_mode)extras.mode : LX_MODE_BAKED;
     out->layer = extras.layer;
     out->density = extras.density > 0 ? extras.density : 1;
+    out->monitor_columns = extras.monitor_columns;
+    out->monitor_rows = extras.monitor_rows;
+    out->animate = extras.animate;
     return LX_OK;
 }
 
@@ -179,6 +184,8 @@ static lx_material default_material(void)
         .metallic = 1,
         .roughness = 1,
         .emissive_strength = 1,
+        .factor_scale = 1,
+        .strength_scale = 1,
         .base_color_texture = no_texture,
         .metallic_roughness_texture = no_texture,
         .emissive_texture = no_texture,

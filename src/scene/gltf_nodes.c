@@ -286,6 +286,7 @@ static lx_result complete_node(lx_gltf_reader *reader, uint32_t index, lx_error 
             return lx_fail(error, LX_ERROR_FORMAT, "%s: its place in the world is not finite", object.label);
     LX_TRY(lx_gltf_extras_read(reader, &object, LX_EXTRAS_NODE, &node->extras, error));
     node->area_owner = node->extras.area != LX_AREA_NONE ? (int32_t)index : parent ? parent->area_owner : -1;
+    node->monitor_owner = node->extras.monitor_columns > 0 ? (int32_t)index : parent ? parent->monitor_owner : -1;
     node->moves = node->transform_animated || (parent && parent->moves);
     node->holds_no_lamps = is_light_group(object.json) || (parent && parent->holds_no_lamps);
     if (parent) node->extras = lx_gltf_extras_merge(node->extras, &parent->extras);
@@ -300,7 +301,7 @@ lx_result lx_gltf_load_nodes(lx_gltf_reader *reader, lx_error *error)
     reader->nodes = lx_calloc_array(count, sizeof *reader->nodes);
     reader->order = lx_malloc_array(count, sizeof *reader->order);
     if (!reader->nodes || !reader->order) return lx_fail_memory(error, "nodes");
-    for (uint32_t i = 0; i < count; ++i) reader->nodes[i].parent = reader->nodes[i].area_owner = -1;
+    for (uint32_t i = 0; i < count; ++i) reader->nodes[i].parent = reader->nodes[i].area_owner = reader->nodes[i].monitor_owner = -1;
     LX_TRY(link_nodes(reader, error));
     LX_TRY(check_rings(reader, error));
     LX_TRY(reach_default_scene(reader, error));

@@ -54,6 +54,8 @@ typedef struct lx_gltf_node {
     bool holds_no_lamps;     ///< In a VPLS… or BLOCKERS… group.
     int32_t area_owner;      ///< The nearest node upwards (or itself) with luxel_area; -1: none.
     bool area_taken;         ///< A lamp below uses this node's luxel_area.
+    int32_t monitor_owner;   ///< The nearest node upwards (or itself) with luxel_monitor; -1: none.
+    bool monitor_taken;      ///< A screen at or below this node uses its luxel_monitor.
     lx_gltf_extras extras;   ///< Its own keys, then completed by those of the nodes above.
 } lx_gltf_node;
 
@@ -91,7 +93,7 @@ typedef struct lx_gltf_reader {
     int32_t default_material; ///< -1: not needed so far.
 
     lx_gltf_light_use *light_uses; ///< One per light of the scene.
-    size_t light_use_capacity;
+    size_t light_use_capacity, track_capacity;
     uint32_t extras_count; ///< Keys of any kind in the extras that were read.
 } lx_gltf_reader;
 
@@ -159,6 +161,9 @@ lx_result lx_gltf_load_lights(lx_gltf_reader *reader, lx_error *error);
 
 // gltf_cameras.c
 lx_result lx_gltf_load_cameras(lx_gltf_reader *reader, lx_error *error);
+
+// gltf_tracks.c: animated light.
+lx_result lx_gltf_load_tracks(lx_gltf_reader *reader, lx_error *error);
 
 // gltf_sources.c
 lx_result lx_gltf_load_sources(lx_gltf_reader *reader, lx_error *error);

@@ -1,6 +1,7 @@
 // Loading scenes from disk and letting go of them.
 #include "scene/scene.h"
 
+#include "base/clock.h"
 #include "base/error.h"
 #include "scene/geometry.h"
 #include "scene/gltf.h"
@@ -17,6 +18,7 @@ lx_result lx_scene_load(lx_context *context, const char *path, const lx_scene_lo
     if (!desc) desc = &defaults;
     lx_bytes file = {0};
     char *folder = NULL;
+    const double start = lx_seconds();
     lx_result result = lx_file_read(path, desc->max_file_bytes, &file, error);
     if (result != LX_OK) {
         lx_error_prefix(error, "%s", path);
@@ -25,6 +27,7 @@ lx_result lx_scene_load(lx_context *context, const char *path, const lx_scene_lo
     folder = lx_path_folder(path);
     result = folder ? lx_gltf_import(context, path, folder, file.data, file.size, desc, out_scene, error)
                     : lx_fail_memory(error, "path");
+    if (result == LX_OK) (*out_scene)->import_seconds = lx_seconds() - start;
     lx_free(folder);
     lx_bytes_release(&file);
     return result;
@@ -47,6 +50,7 @@ void lx_scene_destroy(lx_scene *scene)
     lx_free(scene->lights);
     lx_free(scene->sources);
     lx_free(scene->cameras);
+    lx_free(scene->tracks);
     lx_free(scene->buffers);
     lx_free(scene->image_files);
     lx_gltf_document_release(scene->document);
@@ -57,7 +61,14 @@ void lx_scene_destroy(lx_scene *scene)
 
 bool lx_material_emits(const lx_material *material)
 {
-    return !material->unlit && material->emissive_strength > 0 && lx_rgb_max(material->emissive_factor) > 0;
+    if (material->unlit) return false;
+    return material->emission_animated || (material->emissive_strength > 0 && lx_rgb_max(material->emissive_factor) > 0);
+}
+
+const lx_source *lx_surface_monitor(const lx_scene *scene, uint32_t surface)
+{
+    const int32_t source = scene->surfaces[surface].source;
+    return source >= 0 && scene->sources[source].columns > 0 ? &scene->sources[source] : NULL;
 }
 
 void lx_text_free(char *text) { lx_free(text); }

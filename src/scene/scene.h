@@ -11,9 +11,11 @@
 #include "image/image.h"
 #include "luxel/scene.h"
 #include "math/mat.h"
+#include "scene/program.h"
 
 struct json_t; // jansson's; the document is kept and edited, so that nothing of the input is lost on export
 
+enum { lx_most_monitor_cells = 4096 }; ///< Of one `luxel_monitor`: each is a layer.
 enum { lx_texcoord_sets = 4 }; ///< TEXCOORD_0 … 3 are read; a material that asks for a later set gets a warning and set 0.
 
 typedef enum lx_wrap { LX_WRAP_REPEAT, LX_WRAP_CLAMP, LX_WRAP_MIRROR } lx_wrap;
@@ -61,6 +63,10 @@ typedef struct lx_material {
     lx_light_mode mode;    ///< `luxel_mode` on the material (of its emission).
     const char *layer;     ///< `luxel_layer` on the material; NULL: none.
     float density;         ///< `luxel_density` on the material; 1: none. Multiplies the node's.
+    uint32_t monitor_columns, monitor_rows; ///< `luxel_monitor` on the material; 0: none.
+    const lx_program *animate; ///< `luxel_animate` on the material; NULL: none.
+    bool emission_animated;    ///< An animation of the file changes its factor or strength: it emits, also where it begins black.
+    float factor_scale, strength_scale; ///< emissive_factor = the file's × factor_scale; emissive_strength = the file's × strength_scale.
 } lx_material;
 
 /// One glTF primitive as indexed triangles (strips and fans converted, points and lines dropped). Local space.
@@ -116,6 +122,8 @@ typedef struct lx_light {
     float range;     ///< Metres; 0: unlimited.
     float inner_angle, outer_angle; ///< Spot half-angles, radians.
     float radius;    ///< Point, spot: sphere, metres. Directional: angular diameter, radians. 0: sharp shadows.
+    int32_t file_index;    ///< In the file's lights; -1: made by `luxel_area` alone.
+    float intensity_scale; ///< intensity = the file's × intensity_scale: 1 / area for `luxel_area`, else 1.
 } lx_light;
 
 typedef enum lx_source_kind {
@@ -137,7 +145,32 @@ typedef struct lx_source {
     int32_t material;  ///< Emissive: index into materials; else -1.
     lx_rgb color;      ///< Authored; emissive: emissive_factor.
     float intensity;   ///< In the unit of its kind; emissive: emissive_strength (nit).
+    int32_t file_light;     ///< In the file's lights; -1: none.
+    float color_scale, intensity_scale; ///< color and intensity = the file's × this.
+    const lx_program *animate; ///< `luxel_animate`; NULL: none.
+    uint32_t columns, rows; ///< A monitor (`luxel_monitor`): its grid of cells over TEXCOORD_0. 0: none.
+    lx_rgb white;      ///< Monitor: radiance of a white pixel = white × intensity. `color`, but white where that is black.
+    const lx_rgb *picture; ///< Monitor: [columns × rows] mean linear texel of the emissive texture in each cell, row by row; white without one.
 } lx_source;
+
+static inline uint32_t lx_source_cell_count(const lx_source *source) { return source->columns * source->rows; }
+
+typedef enum lx_track_object { LX_TRACK_LIGHT, LX_TRACK_MATERIAL } lx_track_object;
+typedef enum lx_track_channel { LX_TRACK_COLOR, LX_TRACK_INTENSITY } lx_track_channel;
+typedef enum lx_interpolation { LX_STEP, LX_LINEAR, LX_CUBIC } lx_interpolation; ///< As glTF's STEP, LINEAR, CUBICSPLINE.
+
+/// Keys of an animation of the file for a light or an emissive material (KHR_animation_pointer). Values are the file's own: times the source's
+/// color_scale or intensity_scale they are what sources have.
+typedef struct lx_track {
+    const char *name; ///< Of the animation, else "animation_K".
+    lx_track_object object;
+    uint32_t index;   ///< In the file's lights or materials.
+    lx_track_channel channel; ///< COLOR: a light's color, a material's emissiveFactor. INTENSITY: intensity, emissiveStrength.
+    lx_interpolation interpolation;
+    const float *keys; ///< In the arena: {time_s, value…}, times ascending; CUBIC: {time_s, in-tangent…, value…, out-tangent…}. COLOR has
+                       ///< three numbers a value, INTENSITY one. Values are not negative.
+    uint32_t key_count;
+} lx_track;
 
 typedef struct lx_camera {
     const char *name; ///< Of the node, else of the camera, else "camera_K".
@@ -163,11 +196,13 @@ struct lx_scene {
     lx_light *lights;
     lx_source *sources;
     lx_camera *cameras;
+    lx_track *tracks;
     uint32_t image_count, texture_count, material_count, primitive_count, mesh_count, instance_count, surface_count, light_count,
-        source_count, camera_count;
+        source_count, camera_count, track_count;
 
     lx_bounds bounds;         ///< Of all static instances, world.
     uint64_t triangle_count;  ///< Of all static instances.
+    double import_seconds;    ///< What lx_scene_load took.
     bool from_blender;        ///< asset.generator names Blender's exporter.
 
     // The file, for export.
@@ -184,7 +219,20 @@ lx_vec4 lx_texture_sample(const lx_scene *scene, const lx_texture_slot *slot, lx
 /// True if a texel of the image has alpha below 1, i.e. the slot can let light through.
 bool lx_texture_has_alpha(const lx_scene *scene, const lx_texture_slot *slot);
 
-/// True if the material emits: factor and strength above zero, and not unlit, which ignores emission. (Its texture may still be black.)
+/// The monitor that the surface belongs to; NULL: none.
+const lx_source *lx_surface_monitor(const lx_scene *scene, uint32_t surface);
+
+/// True if the material emits: factor and strength above zero, or animated, and not unlit, which ignores emission. (Its texture may still be
+/// black.)
 bool lx_material_emits(const lx_material *material);
+
+/// The cell of a monitor that TEXCOORD_0 = `uv` lies in: (0, 0) is in cell 0, what lies outside belongs to the nearest one.
+static inline uint32_t lx_monitor_cell(const lx_source *monitor, lx_vec2 uv)
+{
+    // lx_max takes NaN, which overflow may leave, for its second argument.
+    const float x = lx_min(lx_max(uv.x * (float)monitor->columns, 0), (float)(monitor->columns - 1));
+    const float y = lx_min(lx_max(uv.y * (float)monitor->rows, 0), (float)(monitor->rows - 1));
+    return (uint32_t)y * monitor->columns + (uint32_t)x;
+}
 
 #endif

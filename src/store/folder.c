@@ -1,7 +1,7 @@
 // The baked folder appears whole or not at all: written to OUT.partial, then exchanged with OUT.
 //
-// Two folders are ever removed, the old OUT and a stale OUT.partial, and both only if they are ours: OUT holds a luxel.json, OUT.partial
-// a mark that is put there first of all.
+// Two folders are ever removed, the old OUT and a stale OUT.partial, and both only if they are ours: OUT holds a luxel.json (or another
+// mark, for folders of another kind), OUT.partial one that is put there first of all.
 #include "store/folder.h"
 
 #include "base/error.h"
@@ -9,7 +9,7 @@
 
 #include <string.h>
 
-static const char mark_name[] = ".luxel-partial";
+static const char partial_mark[] = ".luxel-partial";
 
 static bool holds(const char *folder, const char *name)
 {
@@ -47,7 +47,7 @@ static char *without_slashes(const char *path)
 }
 
 // `path` has no slash at its end.
-static lx_result check_place(const char *path, lx_error *error)
+static lx_result check_place(const char *path, const char *mark, lx_error *error)
 {
     const char *name = lx_path_name(path);
     if (!*name || strcmp(name, ".") == 0 || strcmp(name, "..") == 0)
@@ -63,32 +63,37 @@ static lx_result check_place(const char *path, lx_error *error)
     if (lx_path_is_link(path))
         return lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "%s: is a symbolic link; name the folder it points to", path);
     if (!lx_path_is_folder(path)) return lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "%s: exists and is no folder", path);
-    if (lx_folder_is_baked(path)) return LX_OK;
+    if (holds(path, mark)) return LX_OK;
     bool empty;
     const lx_result result = is_empty(path, &empty, error);
     if (result != LX_OK || empty) return result;
     return lx_fail(error, LX_ERROR_INVALID_ARGUMENT,
-                   "%s: is not empty and holds no " LX_MANIFEST_NAME ", so it is not replaced; choose another name", path);
+                   "%s: is not empty and holds no %s, so it is not replaced; choose another name", path, mark);
 }
 
-lx_result lx_folder_check(const char *folder, lx_error *error)
+lx_result lx_folder_check_marked(const char *folder, const char *mark, lx_error *error)
 {
     char *path = without_slashes(folder);
     if (!path) return lx_fail_memory(error, "path");
-    const lx_result result = check_place(path, error);
+    const lx_result result = check_place(path, mark, error);
     lx_free(path);
     return result;
 }
 
+lx_result lx_folder_check(const char *folder, lx_error *error)
+{
+    return lx_folder_check_marked(folder, LX_MANIFEST_NAME, error);
+}
+
 // Removes what a killed run left behind.
-static lx_result clear_partial(const char *partial, lx_error *error)
+static lx_result clear_partial(const char *partial, const char *mark, lx_error *error)
 {
     if (!lx_path_exists(partial)) return LX_OK;
     bool ours = false;
     if (!lx_path_is_link(partial) && lx_path_is_folder(partial)) {
         const lx_result result = is_empty(partial, &ours, error);
         if (result != LX_OK) return result;
-        ours |= holds(partial, mark_name) || holds(partial, LX_MANIFEST_NAME);
+        ours |= holds(partial, partial_mark) || holds(partial, mark);
     }
     if (!ours)
         return lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "%s: is in the way, and was not left by an earlier run; remove or rename it",
@@ -98,19 +103,24 @@ static lx_result clear_partial(const char *partial, lx_error *error)
 
 lx_result lx_new_folder_begin(const char *folder, lx_new_folder *out, lx_error *error)
 {
+    return lx_new_folder_begin_marked(folder, LX_MANIFEST_NAME, out, error);
+}
+
+lx_result lx_new_folder_begin_marked(const char *folder, const char *mark, lx_new_folder *out, lx_error *error)
+{
     lx_result result = LX_OK;
-    lx_new_folder fresh = {.path = without_slashes(folder)};
+    lx_new_folder fresh = {.mark = mark, .path = without_slashes(folder)};
     char *partial = fresh.path ? lx_format("%s.partial", fresh.path) : NULL;
     if (!partial) {
         result = lx_fail_memory(error, "path");
         goto cleanup;
     }
-    LX_TRY(check_place(fresh.path, error));
-    LX_TRY(clear_partial(partial, error));
+    LX_TRY(check_place(fresh.path, mark, error));
+    LX_TRY(clear_partial(partial, mark, error));
     LX_TRY(lx_folder_create(partial, error));
     fresh.partial = partial;
     partial = NULL;
-    LX_TRY(lx_new_folder_write(&fresh, mark_name, "", 0, error));
+    LX_TRY(lx_new_folder_write(&fresh, partial_mark, "", 0, error));
     *out = fresh;
     fresh = (lx_new_folder){0};
 cleanup:
@@ -132,14 +142,14 @@ lx_result lx_new_folder_write(const lx_new_folder *folder, const char *name, con
 lx_result lx_new_folder_commit(lx_new_folder *folder, lx_error *error)
 {
     lx_result result = LX_OK;
-    char *mark = lx_path_join(folder->partial, mark_name);
+    char *mark = lx_path_join(folder->partial, partial_mark);
     if (!mark) return lx_fail_memory(error, "path");
-    LX_TRY(check_place(folder->path, error)); // a long bake has passed since it was checked
-    if (!holds(folder->partial, LX_MANIFEST_NAME)) {
-        result = lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "%s: holds no " LX_MANIFEST_NAME, folder->partial);
+    LX_TRY(check_place(folder->path, folder->mark, error)); // a long bake has passed since it was checked
+    if (!holds(folder->partial, folder->mark)) {
+        result = lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "%s: holds no %s", folder->partial, folder->mark);
         goto cleanup;
     }
-    LX_TRY(lx_folder_remove(mark, error)); // from here on the manifest tells whose it is
+    LX_TRY(lx_folder_remove(mark, error)); // from here on its own mark tells whose it is
     LX_TRY(lx_folder_swap(folder->partial, folder->path, error));
     lx_free(folder->path);
     lx_free(folder->partial);

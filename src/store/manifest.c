@@ -10,13 +10,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { max_pages = 65536, max_layers = 1 << 20, max_files = 1 << 22 };
+enum { max_pages = 65536, max_layers = 1 << 20, max_files = 1 << 22, max_animations = 1 << 20 };
 
 void lx_manifest_release(lx_manifest *manifest)
 {
     lx_free(manifest->pages);
     lx_free(manifest->layers);
     lx_free(manifest->files);
+    lx_free(manifest->monitors);
+    lx_free(manifest->animations);
     lx_arena_release(&manifest->strings);
     *manifest = (lx_manifest){0};
 }
@@ -111,6 +113,31 @@ static json_t *write_file(const lx_manifest *manifest, uint32_t index)
     return NULL;
 }
 
+static json_t *write_monitor(const lx_manifest *manifest, uint32_t index)
+{
+    const lx_manifest_monitor *monitor = &manifest->monitors[index];
+    json_t *object = json_object();
+    if (put(object, "name", text(monitor->name)) && put(object, "node", json_integer(monitor->node)) &&
+        (monitor->material < 0 || put(object, "material", json_integer(monitor->material))) &&
+        put(object, "columns", json_integer(monitor->columns)) && put(object, "rows", json_integer(monitor->rows)) &&
+        put(object, "firstLayer", json_integer(monitor->first_layer)) && put(object, "strength", triple(monitor->strength)))
+        return object;
+    json_decref(object);
+    return NULL;
+}
+
+static json_t *write_animation(const lx_manifest *manifest, uint32_t index)
+{
+    const lx_manifest_animation *animation = &manifest->animations[index];
+    json_t *object = json_object();
+    if (put(object, "name", text(animation->name)) && put(object, "layer", json_integer(animation->layer)) &&
+        put(object, "program", text(animation->program)) && put(object, "channel", text(animation->channel)) &&
+        put(object, "duration", real((double)animation->duration_s)))
+        return object;
+    json_decref(object);
+    return NULL;
+}
+
 static json_t *write_array(const lx_manifest *manifest, uint32_t count, json_t *(*write)(const lx_manifest *, uint32_t))
 {
     json_t *array = json_array();
@@ -142,6 +169,45 @@ static json_t *write_sky(const lx_manifest_sky *sky)
     return NULL;
 }
 
+static const struct {
+    const char *key;
+    size_t offset;
+} stage_fields[] = {
+    {"import", offsetof(lx_stage_seconds, import)}, {"unwrap", offsetof(lx_stage_seconds, unwrap)},
+    {"luxels", offsetof(lx_stage_seconds, luxels)}, {"bake", offsetof(lx_stage_seconds, bake)},
+    {"post", offsetof(lx_stage_seconds, post)},     {"save", offsetof(lx_stage_seconds, save)},
+    {"preview", offsetof(lx_stage_seconds, preview)},
+};
+
+static double *stage_field(lx_stage_seconds *stages, size_t index)
+{
+    return (double *)((char *)stages + stage_fields[index].offset);
+}
+
+static json_t *write_stages(lx_stage_seconds stages)
+{
+    json_t *object = json_object();
+    bool ok = object != NULL;
+    for (size_t i = 0; i < sizeof stage_fields / sizeof *stage_fields; ++i)
+        ok = ok && put(object, stage_fields[i].key, real(*stage_field(&stages, i)));
+    if (ok) return object;
+    json_decref(object);
+    return NULL;
+}
+
+static json_t *write_memory(const lx_budget *memory)
+{
+    json_t *object = json_object();
+    if (put(object, "ram", json_integer((json_int_t)memory->ram)) &&
+        put(object, "accumulator", json_integer((json_int_t)memory->accumulator)) &&
+        put(object, "gpu_composed", json_integer((json_int_t)memory->gpu_composed)) &&
+        put(object, "gpu_layers", json_integer((json_int_t)memory->gpu_layers)) &&
+        put(object, "dense", json_integer((json_int_t)memory->dense)))
+        return object;
+    json_decref(object);
+    return NULL;
+}
+
 static json_t *write_bake(const lx_manifest_bake *bake)
 {
     json_t *object = json_object();
@@ -149,6 +215,7 @@ static json_t *write_bake(const lx_manifest_bake *bake)
         put(object, "bounces", bake->bounces == LX_BOUNCES_INF ? json_string("inf") : json_integer(bake->bounces)) &&
         put(object, "integrator", text(bake->integrator)) && put(object, "seed", json_integer(bake->seed)) &&
         put(object, "isa", text(bake->isa)) && put(object, "seconds", real(bake->seconds)) &&
+        put(object, "stages", write_stages(bake->stages)) &&
         put(object, "threads", json_integer(bake->threads)))
         return object;
     json_decref(object);
@@ -204,8 +271,11 @@ lx_result lx_manifest_write(const lx_manifest *manifest, const uint64_t *sizes, 
         (!manifest->scene || put(root, "scene", text(manifest->scene))) && put(root, "pack", text(manifest->pack)) &&
         put(root, "atlas", write_atlas(manifest)) && put(root, "layers", write_array(manifest, manifest->layer_count, write_layer)) &&
         put(root, "files", write_array(manifest, manifest->file_count, write_file)) &&
+        put(root, "monitors", write_array(manifest, manifest->monitor_count, write_monitor)) &&
+        put(root, "animations", write_array(manifest, manifest->animation_count, write_animation)) &&
         (!manifest->has_sky || put(root, "sky", write_sky(&manifest->sky))) &&
-        (!manifest->has_view || put(root, "view", write_view(manifest))) && put(root, "bake", write_bake(&manifest->bake)) &&
+        (!manifest->has_view || put(root, "view", write_view(manifest))) &&
+        (!manifest->memory.ram || put(root, "memory", write_memory(&manifest->memory))) && put(root, "bake", write_bake(&manifest->bake)) &&
         put(root, "hashes", write_hashes(manifest)) && (!sizes || put(root, "sizes", write_sizes(manifest, sizes)));
     if (complete) dump = json_dumps(root, JSON_INDENT(2) | JSON_REAL_PRECISION(9)); // 9 digits hold every float
     char *copy = dump ? lx_format("%s\n", dump) : NULL;
@@ -216,6 +286,24 @@ lx_result lx_manifest_write(const lx_manifest *manifest, const uint64_t *sizes, 
     free(dump);
     json_decref(root);
     return result;
+}
+
+lx_result lx_manifest_drop_files(const char *text_data, size_t size, char **out_text, lx_error *error)
+{
+    json_error_t problem;
+    json_t *root = json_loadb(text_data, size, JSON_REJECT_DUPLICATES, &problem);
+    if (!root) return lx_fail(error, LX_ERROR_FORMAT, "line %d: %s", problem.line, problem.text);
+    json_t *layer;
+    size_t index;
+    json_object_set_new(root, "files", json_array());
+    json_array_foreach(json_object_get(root, "layers"), index, layer) json_object_del(layer, "scale"); // of KTX2 files alone
+    char *dump = json_dumps(root, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
+    char *copy = dump ? lx_format("%s\n", dump) : NULL;
+    free(dump);
+    json_decref(root);
+    if (!copy) return lx_fail_memory(error, "luxel.json");
+    *out_text = copy;
+    return LX_OK;
 }
 
 // ---- reading: every getter names what is wrong, relative to `where`
@@ -383,6 +471,61 @@ cleanup:
     return result;
 }
 
+static lx_result read_monitors(const reader *r, const json_t *root)
+{
+    lx_result result = LX_OK;
+    lx_manifest *m = r->manifest;
+    const json_t *items = NULL;
+    LX_TRY(get_array(r, root, "", "monitors", false, max_layers, sizeof *m->monitors, &items, &m->monitors, &m->monitor_count));
+    for (uint32_t i = 0; i < m->monitor_count; ++i) {
+        const json_t *item = json_array_get(items, i);
+        lx_manifest_monitor *monitor = &m->monitors[i];
+        char where[place_bytes];
+        uint32_t material = UINT32_MAX;
+        name_element(where, "monitors", i);
+        LX_TRY(get_text(r, item, where, "name", NULL, &monitor->name));
+        LX_TRY(get_uint(r, item, where, "node", true, &monitor->node));
+        LX_TRY(get_uint(r, item, where, "material", false, &material));
+        LX_TRY(get_uint(r, item, where, "columns", true, &monitor->columns));
+        LX_TRY(get_uint(r, item, where, "rows", true, &monitor->rows));
+        LX_TRY(get_uint(r, item, where, "firstLayer", true, &monitor->first_layer));
+        LX_TRY(get_color(r, item, where, "strength", monitor->strength));
+        monitor->material = material <= INT32_MAX ? (int32_t)material : -1;
+        const uint64_t cells = (uint64_t)monitor->columns * monitor->rows;
+        if (cells == 0 || cells > m->layer_count || monitor->first_layer > m->layer_count - cells) {
+            result = wrong(r, where, "columns, rows, firstLayer", "there are no such layers");
+            goto cleanup;
+        }
+    }
+cleanup:
+    return result;
+}
+
+static lx_result read_animations(const reader *r, const json_t *root)
+{
+    lx_result result = LX_OK;
+    lx_manifest *m = r->manifest;
+    const json_t *items = NULL;
+    LX_TRY(get_array(r, root, "", "animations", false, max_animations, sizeof *m->animations, &items, &m->animations, &m->animation_count));
+    for (uint32_t i = 0; i < m->animation_count; ++i) {
+        const json_t *item = json_array_get(items, i);
+        lx_manifest_animation *animation = &m->animations[i];
+        char where[place_bytes];
+        name_element(where, "animations", i);
+        LX_TRY(get_text(r, item, where, "name", "", &animation->name));
+        LX_TRY(get_uint(r, item, where, "layer", true, &animation->layer));
+        LX_TRY(get_text(r, item, where, "program", NULL, &animation->program));
+        LX_TRY(get_text(r, item, where, "channel", "light", &animation->channel));
+        LX_TRY(get_float(r, item, where, "duration", false, &animation->duration_s));
+        if (animation->layer >= m->layer_count) {
+            result = wrong(r, where, "layer", "there is no such layer");
+            goto cleanup;
+        }
+    }
+cleanup:
+    return result;
+}
+
 static lx_result read_sky(const reader *r, const json_t *root)
 {
     lx_result result = LX_OK;
@@ -425,6 +568,12 @@ static lx_result read_bake(const reader *r, const json_t *root)
     LX_TRY(get_text(r, object, "bake", "isa", "", &bake->isa));
     LX_TRY(get_float(r, object, "bake", "seconds", false, &seconds));
     bake->seconds = (double)seconds;
+    const json_t *stages = json_object_get(object, "stages");
+    for (size_t i = 0; i < sizeof stage_fields / sizeof *stage_fields; ++i) {
+        float stage = 0;
+        LX_TRY(get_float(r, stages, "bake.stages", stage_fields[i].key, false, &stage));
+        *stage_field(&bake->stages, i) = (double)stage;
+    }
     LX_TRY(get_uint(r, object, "bake", "threads", false, &bake->threads));
 cleanup:
     return result;
@@ -464,6 +613,8 @@ lx_result lx_manifest_read(const char *text_data, size_t size, lx_manifest *out,
     LX_TRY(read_pages(&r, root));
     LX_TRY(read_layers(&r, root));
     LX_TRY(read_files(&r, root));
+    LX_TRY(read_monitors(&r, root));
+    LX_TRY(read_animations(&r, root));
     LX_TRY(read_sky(&r, root));
     LX_TRY(read_view(&r, root));
     LX_TRY(read_bake(&r, root));

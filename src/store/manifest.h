@@ -4,6 +4,7 @@
 
 #include "base/file.h"
 #include "base/memory.h"
+#include "luxel/bake.h"
 
 enum { lx_manifest_version = 1 };
 
@@ -35,12 +36,30 @@ typedef struct lx_manifest_sky {
     float color[3], rotation_deg, intensity;
 } lx_manifest_sky;
 
+typedef struct lx_manifest_monitor {
+    const char *name;
+    uint32_t node;          ///< In the scene file.
+    int32_t material;       ///< Likewise; -1: none.
+    uint32_t columns, rows; ///< Cell k = row × columns + column is layer first_layer + k.
+    uint32_t first_layer;
+    float strength[3];      ///< c of a white pixel, nit.
+} lx_manifest_monitor;
+
+typedef struct lx_manifest_animation {
+    const char *name;    ///< Of the file's animation; "": `luxel_animate`.
+    uint32_t layer;
+    const char *program; ///< "keys", "blink", "flicker", "pulse", "wheel", "schedule", "constant".
+    const char *channel; ///< "light": colour × intensity. "color", "intensity".
+    float duration_s;    ///< Of keys; the period of others.
+} lx_manifest_animation;
+
 typedef struct lx_manifest_bake {
     uint32_t samples, bounces; ///< LX_BOUNCES_INF is written as "inf".
     const char *integrator;
     uint32_t seed;
     const char *isa;
     double seconds;
+    lx_stage_seconds stages;
     uint32_t threads;
 } lx_manifest_bake;
 
@@ -54,10 +73,13 @@ typedef struct lx_manifest {
     lx_manifest_page *pages; ///< Arrays are owned.
     lx_manifest_layer *layers;
     lx_manifest_file *files;
-    uint32_t page_count, layer_count, file_count;
+    lx_manifest_monitor *monitors;
+    lx_manifest_animation *animations;
+    uint32_t page_count, layer_count, file_count, monitor_count, animation_count;
     bool has_sky, has_view;
     lx_manifest_sky sky;
     float view_ev;
+    lx_budget memory; ///< All 0: not known, and not written. Not read: the pack says it.
     lx_manifest_bake bake;
     uint64_t scene_hash, pack_hash; ///< lx_content_hash; 0: not known.
     lx_arena strings;
@@ -74,6 +96,10 @@ bool lx_path_stays_inside(const char *path);
 /// JSON text, indented, ending in a newline; owned by the caller (lx_free). `sizes` (may be NULL) adds "sizes": bytes of each file
 /// named in the manifest, in the order scene, pack, files; 0 leaves one out.
 lx_result lx_manifest_write(const lx_manifest *manifest, const uint64_t *sizes, char **out_text, lx_error *error);
+
+/// The same text without what it says of lightmap files, for a copy of the folder that leaves them out. What it holds besides stays, known or not.
+/// Owned by the caller (lx_free).
+lx_result lx_manifest_drop_files(const char *text, size_t size, char **out_text, lx_error *error);
 
 /// Reads what lx_manifest_write writes; unknown fields are ignored. Hostile text gives an error that names the field.
 lx_result lx_manifest_read(const char *text, size_t size, lx_manifest *out, lx_error *error);

@@ -56,7 +56,7 @@ static float texels_across(const lx_tracer *tracer, uint32_t surface, uint32_t t
     const lx_scene *scene = tracer->scene;
     const lx_surface *s = &scene->surfaces[surface];
     const lx_texture_slot *slot = &scene->materials[s->material].emissive_texture;
-    if (slot->texture < 0 || scene->textures[slot->texture].image < 0) return 0;
+    if (slot->texture < 0 || scene->textures[slot->texture].image < 0 || lx_surface_is_told_by_cell(tracer, surface)) return 0;
     const lx_image *image = &scene->images[scene->textures[slot->texture].image];
     const lx_primitive *primitive = &scene->primitives[s->primitive];
     const lx_vec2 *uvs = primitive->texcoords[slot->texcoord];
@@ -144,7 +144,8 @@ static lx_result add_surface(lx_tracer *tracer, lx_emitters *emitters, size_t *t
 {
     const lx_primitive *primitive = &tracer->scene->primitives[tracer->scene->surfaces[surface].primitive];
     const lx_material *material = &tracer->scene->materials[tracer->scene->surfaces[surface].material];
-    const bool plain = material->emissive_texture.texture < 0 && tracer->surfaces[surface].kind == LX_SURFACE_OPAQUE;
+    const bool white = material->emissive_texture.texture < 0 || lx_surface_is_told_by_cell(tracer, surface);
+    const bool plain = white && tracer->surfaces[surface].kind == LX_SURFACE_OPAQUE;
     const size_t first = emitters->triangle_count;
     if (first + primitive->triangle_count > UINT32_MAX ||
         !lx_array_reserve(&emitters->triangles, triangle_capacity, first + primitive->triangle_count,

@@ -147,8 +147,8 @@ static bool sample_area(const lx_light *light, const lx_receiver *r, lx_vec2 u, 
     return true;
 }
 
-static bool sample_emissive(const lx_tracer *tracer, uint32_t source, const lx_receiver *r, lx_vec2 u, lx_ray *ray,
-                            lx_rgb *irradiance)
+static bool sample_emissive(const lx_tracer *tracer, uint32_t source, const lx_receiver *r, lx_vec2 u, uint32_t count, lx_ray *ray,
+                            lx_rgb *irradiance, uint32_t *cell)
 {
     lx_emitter_sample s;
     if (!lx_emitters_sample(&tracer->emitters, source, u, &s)) return false;
@@ -167,9 +167,10 @@ static bool sample_emissive(const lx_tracer *tracer, uint32_t source, const lx_r
     if (!t->plain) emission = lx_surface_emission(tracer, t->surface, t->triangle, s.u, s.v);
     if (lx_rgb_is_black(emission)) return false;
     const float pdf = s.pdf_area * distance2 / emitter_cosine; // solid angle
-    const float weight = power_heuristic(pdf, cosine / LX_PI);
+    const float weight = power_heuristic((float)count * pdf, cosine / LX_PI);
     *irradiance = lx_rgb_scale(emission, weight * cosine / pdf);
     *ray = ray_to_point(r, lx_offset_origin(point, normal));
+    *cell = lx_tracer_cell_at(tracer, t->surface, t->triangle, s.u, s.v);
     return true;
 }
 
@@ -208,12 +209,13 @@ static bool sample_sky(const lx_tracer *tracer, const lx_receiver *r, lx_vec2 u,
     return true;
 }
 
-bool lx_sample_source(const lx_tracer *tracer, uint32_t source, const lx_receiver *receiver, lx_vec2 u, lx_ray *out_ray,
-                      lx_rgb *out_irradiance)
+bool lx_sample_source(const lx_tracer *tracer, uint32_t source, const lx_receiver *receiver, lx_vec2 u, uint32_t count, lx_ray *out_ray,
+                      lx_rgb *out_irradiance, uint32_t *out_cell)
 {
+    *out_cell = 0;
     const lx_source *s = lx_tracer_source(tracer, source);
     if (s->kind == LX_SOURCE_SKY) return sample_sky(tracer, receiver, u, out_ray, out_irradiance);
-    if (s->kind == LX_SOURCE_EMISSIVE) return sample_emissive(tracer, source, receiver, u, out_ray, out_irradiance);
+    if (s->kind == LX_SOURCE_EMISSIVE) return sample_emissive(tracer, source, receiver, u, count, out_ray, out_irradiance, out_cell);
     const lx_light *light = &tracer->scene->lights[s->light];
     float irradiance = 0;
     bool arrives = false;
@@ -228,13 +230,13 @@ bool lx_sample_source(const lx_tracer *tracer, uint32_t source, const lx_receive
     return arrives;
 }
 
-float lx_hit_weight(const lx_tracer *tracer, const lx_ray *ray, const lx_hit *hit, lx_vec3 hit_normal, float cosine)
+float lx_hit_weight(const lx_tracer *tracer, const lx_ray *ray, const lx_hit *hit, lx_vec3 hit_normal, float cosine, uint32_t count)
 {
     const uint32_t index = tracer->surfaces[hit->surface].first_emitter_triangle + hit->triangle;
     const float pdf_area = lx_emitters_pdf_area(&tracer->emitters, index, hit->u, hit->v);
     const float emitter_cosine = fabsf(lx_dot(hit_normal, ray->direction)); // directions of such rays are unit
     const float pdf = emitter_cosine > 0 ? pdf_area * hit->t * hit->t / emitter_cosine : 0;
-    return power_heuristic(cosine / LX_PI, pdf);
+    return power_heuristic(cosine / LX_PI, (float)count * pdf);
 }
 
 float lx_sky_weight(const lx_tracer *tracer, lx_vec3 direction, float cosine)

@@ -13,16 +13,18 @@ typedef struct lx_receiver {
 
 /// One sample of the irradiance that source `source` (of strength 1 and white colour) would give without occluders, and the shadow ray
 /// that decides. Range, spot cone, receiver's cosine, 1/pdf and, for sources that rays can hit (emissive surfaces, pictures of
-/// skies), the power-heuristic weight against cosine-weighted rays are in it. False: nothing arrives, no ray.
-bool lx_sample_source(const lx_tracer *tracer, uint32_t source, const lx_receiver *receiver, lx_vec2 u, lx_ray *out_ray,
-                      lx_rgb *out_irradiance);
+/// skies), the power-heuristic weight against cosine-weighted rays are in it; `count`: how many such samples share the work against one ray
+/// (the caller averages them). `out_cell`: of the sampled point, see lx_tracer_cell_at. False: nothing arrives, no ray.
+bool lx_sample_source(const lx_tracer *tracer, uint32_t source, const lx_receiver *receiver, lx_vec2 u, uint32_t count, lx_ray *out_ray,
+                      lx_rgb *out_irradiance, uint32_t *out_cell);
 
 /// A cheap upper estimate of the irradiance that a source of strength 1 can give a receiver: 0 if it certainly gives none (below the horizon, outside
 /// the cone or the range, behind a one-sided lamp), infinity if nothing is known. Within the source's own bounds it is infinity too.
 float lx_source_bound(const lx_tracer *tracer, uint32_t source, const lx_receiver *receiver);
 
-/// Weight of an emissive hit found by a cosine-weighted ray from `receiver`, against lx_sample_source. `cosine`: of the ray at the receiver.
-float lx_hit_weight(const lx_tracer *tracer, const lx_ray *ray, const lx_hit *hit, lx_vec3 hit_normal, float cosine);
+/// Weight of an emissive hit found by a cosine-weighted ray from `receiver`, against `count` samples of lx_sample_source. `cosine`: of the
+/// ray at the receiver.
+float lx_hit_weight(const lx_tracer *tracer, const lx_ray *ray, const lx_hit *hit, lx_vec3 hit_normal, float cosine, uint32_t count);
 /// The same for a ray that left the scene. `direction` is unit.
 float lx_sky_weight(const lx_tracer *tracer, lx_vec3 direction, float cosine);
 

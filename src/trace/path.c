@@ -5,6 +5,9 @@
 //     at a vertex, from source s:       t · E_s            (next event; E_s carries its multiple importance weight)
 //     at emission L met by the ray:     t · pi · L · w     (E = ∫ L cos dω, sampled with cos / pi)
 // because outgoing radiance is albedo · E / pi and the ray's estimate multiplies it by pi again.
+//
+// A monitor is one source, sampled as a whole; which cell a sample or a hit lies in decides where its light goes. Where the path starts it gets
+// several samples, well spread over the screen, or its cells would be far noisier than other layers: each gets but its share of them.
 #include "trace/path.h"
 
 #include "base/memory.h"
@@ -14,6 +17,7 @@
 
 enum {
     roulette_from_bounce = 3,
+    most_light_samples = 16, cells_per_light_sample = 4,
     most_passes = 256, // surfaces that one ray may pass through; roulette by alpha ends it long before
 };
 
@@ -41,7 +45,7 @@ struct lx_path_batch {
     lx_hit hits[lx_path_batch_size];
     lx_shading shading[lx_path_batch_size];
     lx_rgb light[lx_path_batch_size], transmittance[lx_path_batch_size];
-    uint32_t owner[lx_path_batch_size];
+    uint32_t owner[lx_path_batch_size], cell[lx_path_batch_size];
     uint64_t ray_count;
 };
 
@@ -70,9 +74,11 @@ static uint32_t dimension_key(const path *p, uint32_t vertex, uint32_t dimension
     return lx_hash_combine(p->stream, vertex * 4096 + dimension);
 }
 
-static void add(double *sums, const lx_path_settings *settings, const path *p, const lx_source_use *use, lx_rgb value)
+static void add(double *sums, const lx_path_settings *settings, const path *p, const lx_source_use *use, uint32_t cell, lx_rgb value)
 {
-    double *sum = sums + 3 * ((size_t)p->target * settings->layer_count + (size_t)use->layer);
+    const size_t layer = (size_t)use->layer + (use->cells ? 0 : cell);
+    if (use->cells) value = lx_rgb_mul(value, use->cells[cell]);
+    double *sum = sums + 3 * ((size_t)p->target * settings->layer_count + layer);
     sum[0] += (double)(value.r * p->weight.r * use->weight.r);
     sum[1] += (double)(value.g * p->weight.g * use->weight.g);
     sum[2] += (double)(value.b * p->weight.b * use->weight.b);
@@ -97,8 +103,16 @@ static float roulette(const path *p, uint32_t key, float brings, float scale)
     return lx_unit_float(bits) < probability ? 1 / probability : 0;
 }
 
-// One light sample for one path. First by what the source could bring at most, before anything is sampled; then by what the sample does bring.
-static bool sample_light(const lx_tracer *tracer, uint32_t source, const path *p, uint32_t vertex, lx_ray *ray, lx_rgb *light)
+// How many light samples a source gets at a vertex. A matter of the source alone: what its cells are used for changes nothing.
+static uint32_t light_sample_count(const lx_tracer *tracer, uint32_t source, uint32_t vertex)
+{
+    const uint32_t wanted = (lx_tracer_cell_count(tracer, source) + cells_per_light_sample - 1) / cells_per_light_sample;
+    return vertex > 0 ? 1 : wanted < most_light_samples ? wanted : most_light_samples;
+}
+
+// One light sample (number `turn` of `count`) for one path. First by what the source could bring at most, before anything is sampled; then by what the sample does bring.
+static bool sample_light(const lx_tracer *tracer, uint32_t source, const path *p, uint32_t vertex, uint32_t turn, uint32_t count,
+                         lx_ray *ray, lx_rgb *light, uint32_t *cell)
 {
     const uint32_t key = lx_hash_combine(tracer->source_keys[source], vertex);
     const float bound = lx_source_bound(tracer, source, &p->receiver), scale = tracer->source_scales[source];
@@ -106,9 +120,9 @@ static bool sample_light(const lx_tracer *tracer, uint32_t source, const path *p
     const float brightness = lx_rgb_max(p->throughput);
     const float chance = vertex > 0 ? roulette(p, key ^ 0x68bc21ebu, brightness * bound, scale) : 1;
     if (chance == 0) return false;
-    const lx_vec2 u = lx_sobol_pair(p->sample, lx_hash_combine(p->stream, key));
-    if (!lx_sample_source(tracer, source, &p->receiver, u, ray, light)) return false;
-    *light = lx_rgb_scale(*light, chance);
+    const lx_vec2 u = lx_sobol_pair(p->sample * count + turn, lx_hash_combine(p->stream, key));
+    if (!lx_sample_source(tracer, source, &p->receiver, u, count, ray, light, cell)) return false;
+    *light = lx_rgb_scale(*light, chance / (float)count);
     if (vertex == 0) return true;
     const float again = roulette(p, key ^ 0x02e5be93u, brightness * lx_rgb_max(*light), scale);
     *light = lx_rgb_scale(*light, again);
@@ -121,17 +135,20 @@ static void add_light_samples(lx_path_batch *b, const lx_path_settings *settings
     for (uint32_t s = 0; s < tracer->source_count; ++s) {
         const lx_source_use *use = &settings->uses[s];
         if (!counts(settings, use, vertex)) continue;
-        size_t count = 0;
-        for (size_t i = 0; i < path_count; ++i) {
-            if (!sample_light(tracer, s, &b->paths[i], vertex, &b->rays[count], &b->light[count])) continue;
-            b->owner[count++] = (uint32_t)i;
-        }
-        lx_trace_transmittance(tracer, b->rays, b->transmittance, count);
-        b->ray_count += count;
-        for (size_t k = 0; k < count; ++k) {
-            const path *p = &b->paths[b->owner[k]];
-            const lx_rgb arrives = lx_rgb_mul(b->light[k], b->transmittance[k]);
-            if (!lx_rgb_is_black(arrives)) add(sums, settings, p, use, lx_rgb_mul(p->throughput, arrives));
+        const uint32_t turns = light_sample_count(tracer, s, vertex);
+        for (uint32_t turn = 0; turn < turns; ++turn) {
+            size_t count = 0;
+            for (size_t i = 0; i < path_count; ++i) {
+                if (!sample_light(tracer, s, &b->paths[i], vertex, turn, turns, &b->rays[count], &b->light[count], &b->cell[count])) continue;
+                b->owner[count++] = (uint32_t)i;
+            }
+            lx_trace_transmittance(tracer, b->rays, b->transmittance, count);
+            b->ray_count += count;
+            for (size_t k = 0; k < count; ++k) {
+                const path *p = &b->paths[b->owner[k]];
+                const lx_rgb arrives = lx_rgb_mul(b->light[k], b->transmittance[k]);
+                if (!lx_rgb_is_black(arrives)) add(sums, settings, p, use, b->cell[k], lx_rgb_mul(p->throughput, arrives));
+            }
         }
     }
 }
@@ -163,7 +180,7 @@ static void add_sky(const lx_path_settings *settings, const path *p, const fligh
     if (!counts(settings, use, vertex)) return;
     const float weight = lx_sky_weight(tracer, direction, f->cosine);
     const lx_rgb radiance = lx_sky_radiance(&tracer->sky, direction);
-    add(sums, settings, p, use, lx_rgb_scale(lx_rgb_mul(f->throughput, radiance), LX_PI * weight));
+    add(sums, settings, p, use, 0, lx_rgb_scale(lx_rgb_mul(f->throughput, radiance), LX_PI * weight));
 }
 
 static void add_emission(const lx_path_settings *settings, const path *p, const flight *f, const lx_ray *ray, const lx_hit *hit,
@@ -173,8 +190,11 @@ static void add_emission(const lx_path_settings *settings, const path *p, const 
     if (source < 0 || lx_rgb_is_black(shading->emission)) return;
     const lx_source_use *use = &settings->uses[source];
     if (!counts(settings, use, vertex)) return;
-    const float weight = lx_hit_weight(settings->tracer, ray, hit, shading->geometric_normal, f->cosine);
-    add(sums, settings, p, use, lx_rgb_scale(lx_rgb_mul(f->throughput, shading->emission), LX_PI * weight));
+    const lx_tracer *tracer = settings->tracer;
+    const uint32_t samples = light_sample_count(tracer, (uint32_t)source, vertex);
+    const float weight = lx_hit_weight(tracer, ray, hit, shading->geometric_normal, f->cosine, samples);
+    const uint32_t cell = lx_tracer_cell_at(tracer, hit->surface, hit->triangle, hit->u, hit->v);
+    add(sums, settings, p, use, cell, lx_rgb_scale(lx_rgb_mul(f->throughput, shading->emission), LX_PI * weight));
 }
 
 // Decides at a surface that lets light through: true if the ray goes straight on. The flight's throughput pays for the choice.

@@ -9,9 +9,11 @@
 
 /// What becomes of the light of one source.
 typedef struct lx_source_use {
-    int32_t layer;  ///< Where it is added; -1: left out.
+    int32_t layer;  ///< Where it is added; -1: left out. For a source told by cell the layer of cell 0; the others follow.
     lx_rgb weight;  ///< Multiplies it: 1 for a layer of one source, its share in a group, authored colour × intensity when combined.
     bool direct;    ///< False: what comes straight from the source to the path's start is left out (mixed lights).
+    const lx_rgb *cells; ///< For a source told by cell: all of it goes to `layer`, each cell's light times its colour here. NULL: every cell
+                         ///< has its own layer.
 } lx_source_use;
 
 typedef struct lx_path_settings {

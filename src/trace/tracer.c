@@ -105,8 +105,11 @@ lx_rgb lx_surface_emission(const lx_tracer *tracer, uint32_t surface, uint32_t t
 {
     const lx_material *m = material_of(tracer, surface);
     const surface_point p = point_of(tracer, surface, triangle, u, v);
-    const lx_vec4 t = sample_slot(tracer, &p, &m->emissive_texture, true);
-    lx_rgb emission = {t.x, t.y, t.z};
+    lx_rgb emission = {1, 1, 1};
+    if (!lx_surface_is_told_by_cell(tracer, surface)) {
+        const lx_vec4 t = sample_slot(tracer, &p, &m->emissive_texture, true);
+        emission = (lx_rgb){t.x, t.y, t.z};
+    }
     if (tracer->surfaces[surface].kind != LX_SURFACE_OPAQUE) // a hole does not shine
         emission = lx_rgb_scale(emission, alpha_at(tracer, surface, m, base_color_at(tracer, m, &p).w));
     return emission;
@@ -284,12 +287,13 @@ static lx_result build_spheres(lx_tracer *tracer, lx_error *error)
     return LX_OK;
 }
 
-static lx_result build_sources(lx_tracer *tracer, const lx_sky_desc *sky, lx_error *error)
+static lx_result build_sources(lx_tracer *tracer, const lx_sky_desc *sky, const bool *cells, lx_error *error)
 {
     const lx_scene *scene = tracer->scene;
     const lx_result result = lx_sky_load(sky, &tracer->sky, error);
     if (result != LX_OK) return result;
-    tracer->sky_source = (lx_source){.kind = LX_SOURCE_SKY, .name = "sky", .mode = LX_MODE_BAKED, .light = -1, .parent_node = -1,
+    tracer->sky_source = (lx_source){.kind = LX_SOURCE_SKY, .name = "sky", .mode = LX_MODE_BAKED, .light = -1, .file_light = -1,
+                                     .parent_node = -1, .color_scale = 1, .intensity_scale = 1,
                                      .material = -1, .color = {sky->color[0], sky->color[1], sky->color[2]},
                                      .intensity = sky->intensity};
     const bool untinted = sky->color[0] == 0 && sky->color[1] == 0 && sky->color[2] == 0;
@@ -297,6 +301,10 @@ static lx_result build_sources(lx_tracer *tracer, const lx_sky_desc *sky, lx_err
     tracer->source_count = scene->source_count + (tracer->sky.present ? 1 : 0);
     tracer->source_keys = lx_calloc_array(tracer->source_count, sizeof(uint32_t));
     if (!tracer->source_keys) return lx_fail_memory(error, "sources");
+    tracer->source_cells = lx_calloc_array(tracer->source_count, sizeof(uint32_t));
+    if (!tracer->source_cells) return lx_fail_memory(error, "sources");
+    for (uint32_t i = 0; cells && i < scene->source_count; ++i)
+        if (cells[i]) tracer->source_cells[i] = lx_source_cell_count(&scene->sources[i]);
     // Keyed by name, so that a source keeps its random numbers when others come and go.
     for (uint32_t i = 0; i < tracer->source_count; ++i) {
         const char *name = lx_tracer_source(tracer, i)->name;
@@ -306,7 +314,7 @@ static lx_result build_sources(lx_tracer *tracer, const lx_sky_desc *sky, lx_err
     return LX_OK;
 }
 
-lx_result lx_tracer_create(const lx_scene *scene, const lx_transport_desc *transport, bool include_dynamic,
+lx_result lx_tracer_create(const lx_scene *scene, const lx_transport_desc *transport, bool include_dynamic, const bool *cells,
                            lx_tracer **out_tracer, lx_error *error)
 {
     lx_result result = LX_OK;
@@ -316,7 +324,7 @@ lx_result lx_tracer_create(const lx_scene *scene, const lx_transport_desc *trans
     tracer->coloured_shadows = transport->coloured_shadows;
     LX_TRY(build_surfaces(tracer, include_dynamic, error));
     LX_TRY(build_accel(tracer, error));
-    LX_TRY(build_sources(tracer, &transport->sky, error));
+    LX_TRY(build_sources(tracer, &transport->sky, cells, error));
     LX_TRY(lx_emitters_build(tracer, error));
     LX_TRY(build_scales(tracer, error));
     LX_TRY(build_spheres(tracer, error));
@@ -334,6 +342,7 @@ void lx_tracer_destroy(lx_tracer *tracer)
     lx_emitters_release(&tracer->emitters);
     lx_sky_release(&tracer->sky);
     lx_free(tracer->source_keys);
+    lx_free(tracer->source_cells);
     lx_free(tracer->source_scales);
     lx_free(tracer->source_spheres);
     lx_free(tracer->surfaces);
@@ -354,6 +363,24 @@ uint32_t lx_tracer_source_count(const lx_tracer *tracer)
 const lx_source *lx_tracer_source(const lx_tracer *tracer, uint32_t index)
 {
     return index < tracer->scene->source_count ? &tracer->scene->sources[index] : &tracer->sky_source;
+}
+
+uint32_t lx_tracer_cell_count(const lx_tracer *tracer, uint32_t source)
+{
+    return tracer->source_cells[source] > 0 ? tracer->source_cells[source] : 1;
+}
+
+bool lx_tracer_is_told_by_cell(const lx_tracer *tracer, uint32_t source)
+{
+    return tracer->source_cells[source] > 0;
+}
+
+uint32_t lx_tracer_cell_at(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, float u, float v)
+{
+    if (!lx_surface_is_told_by_cell(tracer, surface)) return 0;
+    const surface_point p = point_of(tracer, surface, triangle, u, v);
+    const lx_texture_slot plain = {.texture = -1, .texcoord = 0};
+    return lx_monitor_cell(&tracer->scene->sources[tracer->scene->surfaces[surface].source], texcoord_at(&p, &plain));
 }
 
 lx_rgb lx_tracer_sky_radiance(const lx_tracer *tracer, lx_vec3 direction)
@@ -488,7 +515,7 @@ static lx_shading shade(const lx_tracer *tracer, lx_vec3 direction, uint32_t sur
     s.emission = (lx_rgb){0, 0, 0};
     if (m->unlit)
         s.emission = (lx_rgb){base.x, base.y, base.z};
-    else if (s.lit && lx_material_emits(m))
+    else if (s.lit && (lx_material_emits(m) || lx_surface_is_told_by_cell(tracer, surface)))
         s.emission = lx_surface_emission(tracer, surface, triangle, u, v);
     return s;
 }

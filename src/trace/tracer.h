@@ -34,22 +34,30 @@ typedef struct lx_shading {
     float opacity;            ///< Share of light that meets the diffuse surface; 1 for opaque ones.
     lx_rgb albedo;            ///< Diffuse reflectance of that share, at most 0.99.
     lx_rgb transmittance;     ///< Share of light that passes straight on; 0 for opaque surfaces. opacity + transmittance <= 1.
-    lx_rgb emission;          ///< Radiance in nit towards the ray's origin at unit factor and strength (texture alone); 0 if none.
+    lx_rgb emission;          ///< Radiance in nit towards the ray's origin at unit factor and strength (texture alone; 1 for monitors told
+                              ///< by cell); 0 if none.
                               ///< Unlit materials: their base colour.
 } lx_shading;
 
 typedef struct lx_tracer lx_tracer;
 
 /// Builds the acceleration structure and the tables for sampling sources. `include_dynamic`: non-static instances are in it
-/// (pictures); else they are not there at all (bakes). The sky is read from transport->sky.
-lx_result lx_tracer_create(const lx_scene *scene, const lx_transport_desc *transport, bool include_dynamic, lx_tracer **out_tracer,
-                           lx_error *error);
+/// (pictures); else they are not there at all (bakes). The sky is read from transport->sky. `cells`: per source of the scene, true: this
+/// monitor shines white all over, so that its light can be told by cell; NULL, or false: it shines with its picture as any emitter does.
+lx_result lx_tracer_create(const lx_scene *scene, const lx_transport_desc *transport, bool include_dynamic, const bool *cells,
+                           lx_tracer **out_tracer, lx_error *error);
 void lx_tracer_destroy(lx_tracer *tracer);
 
 const lx_scene *lx_tracer_scene(const lx_tracer *tracer);
 /// Sources of the scene, then the sky if there is one (kind LX_SOURCE_SKY, name "sky").
 uint32_t lx_tracer_source_count(const lx_tracer *tracer);
 const lx_source *lx_tracer_source(const lx_tracer *tracer, uint32_t index);
+/// Number of cells that the light of a source is told by: those of a monitor with `cells`; else 1.
+uint32_t lx_tracer_cell_count(const lx_tracer *tracer, uint32_t source);
+/// True for a monitor with `cells`, also one of a single cell.
+bool lx_tracer_is_told_by_cell(const lx_tracer *tracer, uint32_t source);
+/// The cell a point of an emitting surface lies in; 0 unless its source is a monitor with `cells`.
+uint32_t lx_tracer_cell_at(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, float u, float v);
 /// Radiance of the sky at unit intensity and white tint in a direction (picture alone); black without a sky.
 lx_rgb lx_tracer_sky_radiance(const lx_tracer *tracer, lx_vec3 direction);
 

@@ -40,8 +40,16 @@ struct lx_tracer {
     uint32_t *source_keys;       ///< [source count] random stream of each source, from its name: see lx_tracer_source_key.
     float *source_scales;        ///< [source count] a small share of the mean irradiance that a source of strength 1 gives the scene's surfaces.
     lx_source_sphere *source_spheres; ///< [source count]
+    uint32_t *source_cells;      ///< [source count] cells that the source's light is told by; 0: not told by cell.
     uint32_t source_count;
 };
+
+/// True if the surface belongs to a monitor whose light is told by cell.
+static inline bool lx_surface_is_told_by_cell(const lx_tracer *tracer, uint32_t surface)
+{
+    const int32_t source = tracer->scene->surfaces[surface].source;
+    return source >= 0 && tracer->source_cells[source] > 0;
+}
 
 /// Radiance (unit factor and strength, textures and coverage by alpha applied) that a point of an emitting surface sends out of its shining side(s).
 lx_rgb lx_surface_emission(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, float u, float v);

@@ -295,6 +295,7 @@ lx_result lx_atlas_build(const lx_scene *scene, const lx_atlas_desc *desc, const
     job.atlas->rects = lx_calloc_array(scene->instance_count, sizeof *job.atlas->rects);
     if (!job.atlas->primitives || !job.atlas->meshes || !job.atlas->rects) LX_TRY(lx_fail_memory(error, "the atlas"));
     LX_TRY(build(&job, error));
+    job.atlas->seconds = lx_seconds() - job.started;
     *out_atlas = job.atlas;
     job.atlas = NULL;
 cleanup:

@@ -55,7 +55,7 @@ def times(values, color):
     return [tuple(v * c for c in color) for v in values]
 
 
-def _note(row, detail=""):
+def note(row, detail=""):
     ROWS.append(row)
     expect(row.error <= row.tolerance, "%s: expected %.7g, got %.7g: off by %.3g, allowed are %.3g%s" %
            (row.what, row.expected, row.got, row.error, row.tolerance, detail))
@@ -72,15 +72,15 @@ def compare(what, expected, got, tolerance, samples, dark=1e-6):
                 error = math.inf  # not a number
             if error > worst[0]:
                 worst = (error, a, b, k)
-    _note(Row(what, worst[1], worst[2], worst[0], tolerance, len(expected), samples), " (point %d)" % worst[3])
+    note(Row(what, worst[1], worst[2], worst[0], tolerance, len(expected), samples), " (point %d)" % worst[3])
 
 
 def compare_mean(what, expected, values, tolerance, samples):
     """The mean of many points: one number."""
     got = math.fsum(values) / len(values)
-    _note(Row(what, expected, got, abs(got - expected) / expected, tolerance, len(values), samples))
+    note(Row(what, expected, got, abs(got - expected) / expected, tolerance, len(values), samples))
 
 
 def below(what, limit, values, samples):
     got = max(values)
-    _note(Row(what, 0.0, got, got, limit, len(values), samples))
+    note(Row(what, 0.0, got, got, limit, len(values), samples))

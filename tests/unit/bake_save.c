@@ -174,7 +174,7 @@ static void scene_comes_back_with_coordinates_and_sources(void **state)
     lx_tracer *tracer = NULL;
     lx_transport_desc transport = lx_transport_desc_default();
     transport.sky = baked->sky;
-    assert_int_equal(lx_tracer_create(after, &transport, true, &tracer, NULL), LX_OK);
+    assert_int_equal(lx_tracer_create(after, &transport, true, NULL, &tracer, NULL), LX_OK);
     assert_int_equal(lx_tracer_source_count(tracer), baked->use_count);
     const lx_rgb sky = lx_tracer_sky_radiance(tracer, lx_v3(0, 1, 0));
     assert_float_equal(sky.g, 1, 0);

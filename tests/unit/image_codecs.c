@@ -248,6 +248,25 @@ static void jpeg_grey_and_rgb_are_close_to_the_original(void **state)
         }
 }
 
+static void jpeg_round_trip_is_close_and_finer_quality_larger(void **state)
+{
+    (void)state;
+    lx_image image = smooth_image(3);
+    lx_bytes coarse = {0}, fine = {0};
+    lx_error error = {0};
+    assert_int_equal(lx_jpeg_encode(&image, 50, &coarse, &error), LX_OK);
+    assert_int_equal(lx_jpeg_encode(&image, 95, &fine, &error), LX_OK);
+    assert_true(coarse.size < fine.size);
+    lx_image back = decode(fine.data, fine.size);
+    assert_near_bytes(&back, &image, 8);
+    lx_image_release(&back);
+    lx_bytes_release(&coarse);
+    lx_bytes_release(&fine);
+    image.channels = 1; // not written
+    assert_int_equal(lx_jpeg_encode(&image, 95, &fine, &error), LX_ERROR_INVALID_ARGUMENT);
+    lx_image_release(&image);
+}
+
 // libjpeg writes an Adobe marker with CMYK, so 255 means no ink and the colour is C·K / 255.
 static void jpeg_cmyk_becomes_rgb(void **state)
 {
@@ -878,6 +897,7 @@ int main(void)
         cmocka_unit_test(png_palette_with_transparency_becomes_rgba),
         cmocka_unit_test(png_grey_bits_with_transparency_become_grey_and_alpha),
         cmocka_unit_test(jpeg_grey_and_rgb_are_close_to_the_original),
+        cmocka_unit_test(jpeg_round_trip_is_close_and_finer_quality_larger),
         cmocka_unit_test(jpeg_cmyk_becomes_rgb),
         cmocka_unit_test(webp_lossless_is_exact_and_lossy_is_close),
         cmocka_unit_test(exr_round_trips_floats_exactly),

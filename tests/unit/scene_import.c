@@ -525,7 +525,7 @@ static void animation_pointers_move_nodes_but_colours_do_not(void **state)
                         "{'sampler':0,'target':{'path':'pointer','extensions':{'KHR_animation_pointer':{'pointer':'/"
                         "nodes/1/translation'}}}},"
                         "{'sampler':0,'target':{'path':'pointer','extensions':{'KHR_animation_pointer':{'pointer':'/"
-                        "materials/0/emissiveFactor'}}}}]}],"
+                        "materials/0/pbrMetallicRoughness/baseColorFactor'}}}}]}],"
                         "'nodes':[{'mesh':0},{'mesh':0}]");
     assert_true(scene->instances[0].is_static);
     assert_false(scene->instances[1].is_static);

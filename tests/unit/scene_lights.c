@@ -409,7 +409,7 @@ static void unknown_key_is_told_with_the_nearest_one(void **state)
                                      "monitor':'4x3','luxel_probes':'points'}}]"));
     assert_logged("warning: node 0 'wall': unknown key luxel_densty; did you mean luxel_density?");
     assert_not_logged("other");
-    assert_not_logged("monitor");
+    assert_not_logged("unknown key luxel_monitor");
     assert_not_logged("probes");
 }
 

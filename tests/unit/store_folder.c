@@ -210,6 +210,23 @@ static void foreign_partial_folder_is_refused(void **state)
     assert_refused(out_path, "in the way");
 }
 
+static void folders_of_another_kind_are_known_by_their_own_mark(void **state)
+{
+    (void)state;
+    lx_new_folder fresh = {0};
+    lx_error error = {0};
+    assert_int_equal(lx_new_folder_begin_marked(out_path, "mark", &fresh, &error), LX_OK);
+    assert_int_equal(lx_new_folder_write(&fresh, LX_MANIFEST_NAME, "{}", 2, &error), LX_OK);
+    assert_int_equal(lx_new_folder_commit(&fresh, &error), LX_ERROR_INVALID_ARGUMENT); // it lacks the mark
+    assert_int_equal(lx_new_folder_write(&fresh, "mark", "1", 1, &error), LX_OK);
+    assert_int_equal(lx_new_folder_commit(&fresh, &error), LX_OK);
+    assert_int_equal(lx_folder_check_marked(out_path, "mark", &error), LX_OK);
+    assert_int_equal(lx_folder_check_marked(out_path, "other", &error), LX_ERROR_INVALID_ARGUMENT);
+    assert_non_null(strstr(error.message, "other"));
+    assert_int_equal(lx_new_folder_begin_marked(out_path, "other", &fresh, &error), LX_ERROR_INVALID_ARGUMENT);
+    assert_true(has_file(out_path, "mark", "1"));
+}
+
 int main(void)
 {
 #define TEST(name) cmocka_unit_test_setup_teardown(name, make_root, remove_root)
@@ -223,6 +240,7 @@ int main(void)
         TEST(failing_writes_keep_the_old_result),
         TEST(partial_folder_of_a_killed_run_is_replaced),
         TEST(foreign_partial_folder_is_refused),
+        TEST(folders_of_another_kind_are_known_by_their_own_mark),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

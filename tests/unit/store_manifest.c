@@ -32,7 +32,7 @@ static void fill(lx_manifest *manifest)
         .has_view = true,
         .sky = {"sky.exr", {1, 0.5f, 0.25f}, 45, 3},
         .view_ev = -3.1415927f,
-        .bake = {256, LX_BOUNCES_INF, "path", 7, "avx2", 12.5, 8},
+        .bake = {256, LX_BOUNCES_INF, "path", 7, "avx2", 12.5, {0.5, 1, 0.25, 9, 0.125, 2, 3}, 8},
         .scene_hash = 0x0123456789abcdef,
         .pack_hash = 0xfedcba9876543210,
     };
@@ -53,8 +53,10 @@ static void manifest_round_trip_keeps_every_bit(void **state)
     fill(&manifest);
     assert_int_equal(lx_manifest_write(&manifest, NULL, &text, &error), LX_OK);
     assert_non_null(strstr(text, "\"bounces\": \"inf\""));
+    assert_null(strstr(text, "\"memory\""));
     assert_null(strstr(text, "sizes"));
     assert_int_equal(lx_manifest_read(text, strlen(text), &back, &error), LX_OK);
+    assert_memory_equal(&back.bake.stages, &manifest.bake.stages, sizeof back.bake.stages);
     assert_string_equal(back.generator, manifest.generator);
     assert_string_equal(back.scene, manifest.scene);
     assert_string_equal(back.pack, manifest.pack);
@@ -118,6 +120,28 @@ static lx_result read_changed(const char *from, const char *to, char message[512
     assert_non_null(at);
     snprintf(text, sizeof text, "%.*s%s%s", (int)(at - smallest), smallest, to, at + strlen(from));
     return read_text(text, message);
+}
+
+static void manifest_without_files_keeps_all_else(void **state)
+{
+    (void)state;
+    static const char text[] = "{\"version\":1,\"later\":{\"x\":[1,2]},\"files\":[{\"file\":\"a.exr\"}],"
+                               "\"layers\":[{\"name\":\"a\",\"scale\":0.5},{\"name\":\"b\"}]}";
+    char *lean = NULL;
+    lx_error error = {0};
+    assert_int_equal(lx_manifest_drop_files(text, strlen(text), &lean, &error), LX_OK);
+    assert_non_null(strstr(lean, "\"later\""));
+    assert_non_null(strstr(lean, "\"name\": \"b\""));
+    assert_non_null(strstr(lean, "\"files\": []"));
+    assert_null(strstr(lean, "a.exr"));
+    assert_null(strstr(lean, "scale"));
+    lx_free(lean);
+    assert_int_equal(lx_manifest_drop_files("{", 1, &lean, &error), LX_ERROR_FORMAT);
+    static const char odd[] = "{\"layers\":[1,null]}"; // whatever it holds
+    assert_int_equal(lx_manifest_drop_files(odd, strlen(odd), &lean, &error), LX_OK);
+    lx_free(lean);
+    assert_int_equal(lx_manifest_drop_files("[]", 2, &lean, &error), LX_OK);
+    lx_free(lean);
 }
 
 static void manifest_with_optional_fields_left_out_is_read(void **state)
@@ -209,6 +233,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(manifest_round_trip_keeps_every_bit),
+        cmocka_unit_test(manifest_without_files_keeps_all_else),
         cmocka_unit_test(manifest_with_optional_fields_left_out_is_read),
         cmocka_unit_test(manifest_with_wrong_fields_names_them),
         cmocka_unit_test(manifest_with_any_byte_changed_never_crashes),

@@ -1,0 +1,298 @@
+// Layers of monitors and what drives layers: names, groups, colours, and what is refused or told.
+#include "bake/animations.h"
+#include "unit/scene_fixture.h"
+
+#include "luxel/bake.h"
+
+// A quad with TEXCOORD_0 = (0,0) at its top left; scalar keys 0 1 2 (accessor 3), values 10 20 40 (4).
+static void quad_bin(void)
+{
+    bin_clear();
+    BIN_FLOATS(-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0);
+    BIN_FLOATS(0, 1, 1, 1, 1, 0, 0, 0);
+    BIN_U16(0, 1, 2, 0, 2, 3);
+    BIN_FLOATS(0, 1, 2);
+    BIN_FLOATS(10, 20, 40);
+}
+
+#define QUAD                                                                                                                             \
+    "'extensionsUsed':['KHR_lights_punctual','KHR_animation_pointer','KHR_materials_emissive_strength'],'bufferViews':[{'buffer':0,"      \
+    "'byteLength':48},{'buffer':0,'byteOffset':48,'byteLength':32},{'buffer':0,'byteOffset':80,'byteLength':12},{'buffer':0,"             \
+    "'byteOffset':92,'byteLength':12},{'buffer':0,'byteOffset':104,'byteLength':12}],'accessors':[{'bufferView':0,'componentType':5126,"  \
+    "'count':4,'type':'VEC3'},{'bufferView':1,'componentType':5126,'count':4,'type':'VEC2'},{'bufferView':2,'componentType':5123,"        \
+    "'count':6,'type':'SCALAR'},{'bufferView':3,'componentType':5126,'count':3,'type':'SCALAR'},{'bufferView':4,'componentType':5126,"    \
+    "'count':3,'type':'SCALAR'}],'meshes':[{'primitives':[{'attributes':{'POSITION':0,'TEXCOORD_0':1},'indices':2,'material':0}]},"       \
+    "{'primitives':[{'attributes':{'POSITION':0,'TEXCOORD_0':1},'indices':2,'material':1}]}]"
+#define STRENGTH(nit) "'extensions':{'KHR_materials_emissive_strength':{'emissiveStrength':" #nit "}}"
+#define LAMP(index) "'extensions':{'KHR_lights_punctual':{'light':" #index "}}"
+#define LIGHTS(list) ",'extensions':{'KHR_lights_punctual':{'lights':[" list "]}}"
+#define KEYS(pointer)                                                                                                                    \
+    ",'animations':[{'name':'dance','samplers':[{'input':3,'output':4}],'channels':[{'sampler':0,'target':{'path':'pointer',"             \
+    "'extensions':{'KHR_animation_pointer':{'pointer':'" pointer "'}}}}]}]"
+
+typedef struct layered {
+    lx_scene *scene;
+    lx_atlas *atlas;
+    lx_bake *bake;
+    lx_error error;
+} layered;
+
+static layered build(const char *members, bool combined, lx_result expected)
+{
+    layered l = {0};
+    lx_bake_desc desc = lx_bake_desc_default();
+    lx_atlas_desc atlas_desc = lx_atlas_desc_default();
+    desc.combined = combined;
+    desc.max_layers = 3;
+    atlas_desc.page_size = 64;
+    quad_bin();
+    l.scene = import_members(members);
+    assert_int_equal(lx_atlas_build(l.scene, &atlas_desc, NULL, &l.atlas, NULL), LX_OK);
+    const lx_result result = lx_bake_create(l.scene, l.atlas, &desc, &l.bake, &l.error);
+    if (result != expected) fail_msg("%d, not %d: %s", result, expected, l.error.message);
+    return l;
+}
+
+static void release(layered *l)
+{
+    lx_bake_destroy(l->bake);
+    lx_atlas_destroy(l->atlas);
+    lx_scene_destroy(l->scene);
+}
+
+static const lx_pack_animation *animation(const layered *l, size_t index)
+{
+    if (index >= l->bake->animations->count) fail_msg("only %zu animations; log:\n%s", l->bake->animations->count, fixture_log);
+    return &l->bake->animations->items[index];
+}
+
+static void monitor_has_a_layer_for_each_cell(void **state)
+{
+    (void)state;
+    layered l = build(QUAD ",'materials':[{'emissiveFactor':[1,0.5,0.25]," STRENGTH(8) ",'extras':{'luxel_monitor':'3x2'}},{}],'nodes':["
+                           "{'name':'lamp','mesh':0,'extras':{'luxel_monitor':'1x1'}},{'name':'tv','mesh':0},{'mesh':1}]", false, LX_OK);
+    assert_int_equal(l.bake->layer_count, 7);
+    assert_string_equal(l.bake->layers[0].name, "lamp/0");
+    assert_string_equal(l.bake->layers[1].name, "tv/0");
+    assert_string_equal(l.bake->layers[6].name, "tv/5");
+    assert_int_equal(l.bake->uses[1].layer, 1);
+    assert_int_equal(l.bake->layers[5].cell, 4);
+    assert_near(l.bake->layers[4].color[1], 0.5, 0);
+    assert_near(l.bake->layers[4].intensity, 8, 0);
+    assert_string_equal(l.bake->layers[4].unit, "nt");
+    release(&l);
+}
+
+static void monitors_of_one_layer_share_its_cells(void **state)
+{
+    (void)state;
+    layered l = build(QUAD ",'materials':[{'emissiveFactor':[1,1,1]," STRENGTH(8) "},{'emissiveFactor':[1,1,1]," STRENGTH(2) "}],'nodes':[{'name':'wall',"
+                           "'extras':{'luxel_monitor':'2x2','luxel_layer':'screens'},'children':[1,2]},{'name':'a','mesh':0},{'name':'b','mesh':1}]",
+                      false, LX_OK);
+    assert_int_equal(l.bake->layer_count, 4);
+    assert_string_equal(l.bake->layers[3].name, "screens/3");
+    assert_int_equal(l.bake->uses[0].layer, 0);
+    assert_int_equal(l.bake->uses[1].layer, 0);
+    assert_near(l.bake->uses[0].weight.g, 1, 0);
+    assert_near(l.bake->uses[1].weight.g, 0.25, 0);
+    assert_near(l.bake->layers[2].intensity, 8, 0);
+    release(&l);
+}
+
+static void monitors_that_cannot_share_cells_are_refused(void **state)
+{
+    (void)state;
+    layered l = build(QUAD ",'materials':[{'emissiveFactor':[1,1,1]},{'emissiveFactor':[1,1,1]}],'nodes':[{'name':'a','mesh':0,'extras':{"
+                           "'luxel_monitor':'2x2','luxel_layer':'s'}},{'name':'b','mesh':1,'extras':{'luxel_monitor':'4x1','luxel_layer':'s'}}]",
+                      false, LX_ERROR_FORMAT);
+    assert_string_equal(l.error.message, "layer 's': monitors 'a' (2x2) and 'b' (4x1) have different grids; give them two luxel_layer names");
+    release(&l);
+    l = build(QUAD ",'materials':[{'emissiveFactor':[1,1,1]},{'emissiveFactor':[1,1,1]}],'nodes':[{'name':'a','mesh':0,'extras':{"
+                   "'luxel_layer':'s'}},{'name':'b','mesh':1,'extras':{'luxel_monitor':'4x1','luxel_layer':'s'}}]",
+              false, LX_ERROR_FORMAT);
+    assert_string_equal(l.error.message, "layer 's': 'b' is a monitor and 'a' is not; give them two luxel_layer names");
+    release(&l);
+}
+
+static void monitor_that_is_off_shares_cells_with_a_warning(void **state)
+{
+    (void)state;
+    layered l = build(QUAD ",'materials':[{'emissiveFactor':[1,1,1]},{}],'nodes':[{'name':'a','mesh':0,'extras':{'luxel_monitor':'2x2','luxel_layer':'s'"
+                           "}},{'name':'b','mesh':1,'extras':{'luxel_monitor':'2x2','luxel_layer':'s'}}]", false, LX_OK);
+    assert_logged("warning: layer 's': monitors 'a' and 'b' share their cells but show different pictures; that of 'a' is baked for both");
+    assert_near(l.bake->uses[1].weight.r, 1, 0);
+    release(&l);
+}
+
+static void monitors_count_once_and_are_never_grouped(void **state)
+{
+    (void)state;
+    layered l = build(QUAD ",'materials':[{'name':'screen','emissiveFactor':[1,1,1]},{'name':'neon','emissiveFactor':[1,0,0]}],'nodes':[{'name':'a',"
+                           "'mesh':0,'extras':{'luxel_monitor':'4x4'}},{'name':'b','mesh':1},{'name':'c','mesh':1},{'name':'d','mesh':1}]",
+                      false, LX_OK);
+    assert_logged("note: 4 sources are more than --max-layers 3: grouped by material into 2 layers");
+    assert_int_equal(l.bake->layer_count, 17);
+    assert_string_equal(l.bake->layers[16].name, "neon");
+    release(&l);
+}
+
+static void monitor_in_a_combined_bake_is_an_emitter_like_others(void **state)
+{
+    (void)state;
+    layered l = build(QUAD ",'materials':[{'emissiveFactor':[1,1,1],'extras':{'luxel_monitor':'3x2','luxel_animate':'blink 2'}},{}],'nodes':[{'mesh':0}]",
+                      true, LX_OK);
+    assert_int_equal(l.bake->layer_count, 1);
+    assert_false(lx_tracer_is_told_by_cell(l.bake->tracer, 0));
+    assert_null(l.bake->uses[0].cells);
+    assert_int_equal(l.bake->animations->count, 0);
+    release(&l);
+}
+
+static void program_drives_its_layer_at_the_authored_colour(void **state)
+{
+    (void)state;
+    layered l = build(QUAD ",'materials':[{'emissiveFactor':[1,0.5,0]," STRENGTH(6) "},{}],'nodes':[{'name':'neon','mesh':0,'extras':{"
+                           "'luxel_animate':'blink 2 duty=0.25 low=0.125'}}]", false, LX_OK);
+    const lx_pack_animation *a = animation(&l, 0);
+    assert_string_equal(a->name, "");
+    assert_int_equal(a->layer, 0);
+    assert_int_equal(a->program.kind, LXRT_PROGRAM_BLINK);
+    float c[3];
+    assert_int_equal(lxrt_program_evaluate(&a->program, 0.25, c), LXRT_OK);
+    assert_near(c[0], 6, 0);
+    assert_near(c[1], 3, 0);
+    assert_int_equal(lxrt_program_evaluate(&a->program, 1, c), LXRT_OK);
+    assert_near(c[0], 0.75, 0);
+    release(&l);
+}
+
+static void schedule_counts_in_the_unit_of_the_file(void **state)
+{
+    (void)state;
+    // 8 cd through 4 m²: 2 nit. The schedule's 16 are candela too.
+    layered l = build(QUAD ",'materials':[{},{}]" LIGHTS("{'type':'point','intensity':8}") ",'nodes':[{'mesh':0},{'name':'panel'," LAMP(0)
+                      ",'extras':{'luxel_area':'rect 2 2','luxel_animate':'schedule 10 0=#ffffff 5=1,0,0*16'}}]", false, LX_OK);
+    const lx_pack_animation *a = animation(&l, 0);
+    float c[3];
+    assert_near(l.bake->layers[0].intensity, 2, 1e-6);
+    assert_int_equal(lxrt_program_evaluate(&a->program, 1, c), LXRT_OK);
+    assert_near(c[1], 2, 1e-6);
+    assert_int_equal(lxrt_program_evaluate(&a->program, 6, c), LXRT_OK);
+    assert_near(c[0], 4, 1e-6);
+    assert_near(c[1], 0, 0);
+    release(&l);
+}
+
+static void program_of_one_source_drives_the_whole_layer_with_a_warning(void **state)
+{
+    (void)state;
+    layered l = build(QUAD ",'materials':[{'emissiveFactor':[1,1,1]},{'emissiveFactor':[1,1,1]}],'nodes':[{'name':'a','mesh':0,'extras':{'luxel_layer':'s',"
+                           "'luxel_animate':'pulse 2'}},{'name':'b','mesh':1,'extras':{'luxel_layer':'s'}}]", false, LX_OK);
+    assert_int_equal(l.bake->animations->count, 1);
+    assert_logged("warning: layer 's': luxel_animate of 'a' also drives 'b', which has none");
+    release(&l);
+}
+
+static void programs_that_do_nothing_are_told(void **state)
+{
+    (void)state;
+    layered l = build(QUAD ",'materials':[{'emissiveFactor':[1,1,1],'extras':{'luxel_animate':'wheel 3'}},{}],'nodes':[{'name':'grey','mesh':0},"
+                           "{'name':'tv','mesh':0,'extras':{'luxel_monitor':'2x1'}}]", false, LX_OK);
+    assert_logged("warning: layer 'grey': its luxel_animate turns the hue of a colour that has none; add color=#rrggbb");
+    assert_logged("warning: monitor 'tv': luxel_animate has no effect: its picture drives it");
+    assert_int_equal(l.bake->animations->count, 1);
+    release(&l);
+}
+
+static void two_flickers_differ_unless_they_share_a_seed(void **state)
+{
+    (void)state;
+    layered l = build(QUAD ",'materials':[{'emissiveFactor':[1,1,1],'extras':{'luxel_animate':'flicker'}},{'emissiveFactor':[1,1,1],'extras':{"
+                           "'luxel_animate':'flicker seed=5'}}],'nodes':[{'name':'a','mesh':0},{'name':'b','mesh':0},{'name':'c','mesh':1}]",
+                      false, LX_OK);
+    assert_int_not_equal(animation(&l, 0)->program.seed, animation(&l, 1)->program.seed);
+    assert_int_equal(animation(&l, 2)->program.seed, 5);
+    release(&l);
+}
+
+static void animated_intensity_is_scaled_to_the_layer(void **state)
+{
+    (void)state;
+    layered l = build(QUAD ",'materials':[{},{}]" LIGHTS("{'type':'point','intensity':8,'color':[1,0.5,0]}") ",'nodes':[{'mesh':0},{'name':'panel'," LAMP(0)
+                      ",'extras':{'luxel_area':'rect 2 2'}},{'name':'small'," LAMP(0) ",'extras':{'luxel_area':'rect 1 1'}}]"
+                      KEYS("/extensions/KHR_lights_punctual/lights/0/intensity"), false, LX_OK);
+    assert_int_equal(l.bake->animations->count, 2);
+    const lx_pack_animation *a = animation(&l, 0);
+    assert_string_equal(a->name, "dance");
+    assert_int_equal(a->channel, LX_PACK_CHANNEL_INTENSITY);
+    assert_near(a->program.keys[1], 2.5, 1e-6); // 10 cd through 4 m²
+    assert_near(a->program.keys[5], 10, 1e-6);
+    assert_near(animation(&l, 1)->program.keys[5], 40, 1e-5); // 40 cd through 1 m²
+    release(&l);
+}
+
+static void animated_strength_is_scaled_as_the_importer_scaled_it(void **state)
+{
+    (void)state;
+    layered l = build(QUAD ",'materials':[{'emissiveFactor':[2,1,0]," STRENGTH(3) "},{}],'nodes':[{'mesh':0}]"
+                      KEYS("/materials/0/extensions/KHR_materials_emissive_strength/emissiveStrength"), false, LX_OK);
+    assert_near(l.bake->layers[0].color[1], 0.5, 0);
+    assert_near(animation(&l, 0)->program.keys[1], 20, 0); // × the 2 that the factor was brought to 1 by
+    release(&l);
+}
+
+static void layer_of_two_lamps_is_not_driven_by_one(void **state)
+{
+    (void)state;
+    layered l = build(QUAD ",'materials':[{},{}]" LIGHTS("{'type':'point'},{'type':'point'}") ",'nodes':[{'mesh':0},{'name':'a'," LAMP(0)
+                      ",'extras':{'luxel_layer':'s'}},{'name':'b'," LAMP(1) ",'extras':{'luxel_layer':'s'}}]"
+                      KEYS("/extensions/KHR_lights_punctual/lights/0/intensity"), false, LX_OK);
+    assert_int_equal(l.bake->animations->count, 0);
+    assert_logged("warning: animation 'dance' drives 'a' but not 'b', which are both in layer 's'; not baked: give them two layers");
+    release(&l);
+}
+
+static void group_of_one_animated_lamp_that_is_off_keeps_its_proportions(void **state)
+{
+    (void)state;
+    layered l = build(QUAD ",'materials':[{},{}]" LIGHTS("{'type':'point','intensity':0}") ",'nodes':[{'mesh':0},{'name':'a'," LAMP(0)
+                      ",'extras':{'luxel_layer':'s','luxel_area':'rect 1 1'}},{'name':'b'," LAMP(0) ",'extras':{'luxel_layer':'s','luxel_area':'rect 2 2'}}]"
+                      KEYS("/extensions/KHR_lights_punctual/lights/0/intensity"), false, LX_OK);
+    assert_near(l.bake->uses[0].weight.r, 1, 0);
+    assert_near(l.bake->uses[1].weight.r, 0.25, 1e-6);
+    assert_near(animation(&l, 0)->program.keys[1], 10, 1e-5);
+    release(&l);
+}
+
+static void animation_of_a_monitor_is_told(void **state)
+{
+    (void)state;
+    layered l = build(QUAD ",'materials':[{'emissiveFactor':[1,1,1],'extras':{'luxel_monitor':'2x1'}},{}],'nodes':[{'name':'tv','mesh':0}]"
+                      KEYS("/materials/0/extensions/KHR_materials_emissive_strength/emissiveStrength"), false, LX_OK);
+    assert_int_equal(l.bake->animations->count, 0);
+    assert_logged("warning: animation 'dance' has no effect on monitor 'tv': its picture drives it");
+    release(&l);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(monitor_has_a_layer_for_each_cell),
+        cmocka_unit_test(monitors_of_one_layer_share_its_cells),
+        cmocka_unit_test(monitors_that_cannot_share_cells_are_refused),
+        cmocka_unit_test(monitor_that_is_off_shares_cells_with_a_warning),
+        cmocka_unit_test(monitors_count_once_and_are_never_grouped),
+        cmocka_unit_test(monitor_in_a_combined_bake_is_an_emitter_like_others),
+        cmocka_unit_test(program_drives_its_layer_at_the_authored_colour),
+        cmocka_unit_test(schedule_counts_in_the_unit_of_the_file),
+        cmocka_unit_test(program_of_one_source_drives_the_whole_layer_with_a_warning),
+        cmocka_unit_test(programs_that_do_nothing_are_told),
+        cmocka_unit_test(two_flickers_differ_unless_they_share_a_seed),
+        cmocka_unit_test(animated_intensity_is_scaled_to_the_layer),
+        cmocka_unit_test(animated_strength_is_scaled_as_the_importer_scaled_it),
+        cmocka_unit_test(layer_of_two_lamps_is_not_driven_by_one),
+        cmocka_unit_test(group_of_one_animated_lamp_that_is_off_keeps_its_proportions),
+        cmocka_unit_test(animation_of_a_monitor_is_told),
+    };
+    return cmocka_run_group_tests_name("bake layers", tests, fixture_setup, fixture_teardown);
+}
