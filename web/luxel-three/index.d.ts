@@ -1,8 +1,9 @@
 // luxel-three: baked light for three.js. `const room = await loadLuxel(renderer, 'room.baked/')`.
-import type { Camera, Color, ColorRepresentation, DataTexture, InstancedMesh, Light, Mesh, Object3D, Scene, Texture, WebGLRenderer } from 'three';
+import type { Camera, Color, ColorRepresentation, Light, Mesh, Scene, WebGLRenderer } from 'three';
+import type { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 
 /** How the sum of layers is made. `cpu`: composed in WebAssembly when colours change, and uploaded. `gpu`: summed per pixel from an
- *  array texture of all layers. `auto`: by what this machine was measured to do (see {@link Room.method}). */
+ *  array texture of all layers. `auto`: by what this machine was measured to do (see {@link Room.methodReason}). */
 export type Method = 'auto' | 'cpu' | 'gpu';
 
 export interface LoadOptions {
@@ -17,21 +18,25 @@ export interface LoadOptions {
   /** Called with 0…1 and with bytes while files arrive. */
   onProgress?: (fraction: number, loadedBytes: number, totalBytes: number) => void;
   signal?: AbortSignal;
+  /** A loader that is set up already, e.g. with a KTX2Loader or a DRACOLoader. Meshopt needs none. */
+  gltfLoader?: GLTFLoader;
 }
 
-/** One layer: what one colour drives. */
+export type Kind = 'point' | 'spot' | 'directional' | 'rect' | 'disk' | 'emissive' | 'sky' | 'combined';
+
+/** One layer: what one colour drives. `color` and `intensity` may be set here as well as by {@link Room.setLight}; they show what is driven, too. */
 export interface LayerLight {
   readonly name: string;
   readonly index: number;
-  /** `point`, `spot`, `directional`, `rect`, `disk`, `emissive`, `sky`, `combined`. */
-  readonly kind: string;
-  /** `cd`, `lx` or `nt`. */
-  readonly unit: string;
+  /** Of its first source. */
+  readonly kind: Kind;
+  /** Of intensity: candela, lux, nit. */
+  readonly unit: 'cd' | 'lx' | 'nt';
   /** True: its direct light is not in the lightmap. */
   readonly mixed: boolean;
   /** As authored. */
   readonly authored: { readonly color: Color; readonly intensity: number };
-  /** Linear colour; set by {@link Room.setLight}. */
+  /** Linear colour: c = color × intensity. */
   readonly color: Color;
   intensity: number;
   /** Muted layers shine not at all; when any layer is solo, only solo layers shine. Colours are kept. */
@@ -63,9 +68,11 @@ export interface Monitor {
 }
 
 export interface LuxelAnimation {
+  /** The glTF animation's; empty: the program of a `luxel_animate` key. */
   readonly name: string;
+  /** -1: it moves things, not light. */
   readonly layer: number;
-  readonly kind: string;
+  readonly kind: Program['kind'] | 'nodes';
   readonly duration: number;
   readonly playing: boolean;
 }
@@ -103,9 +110,10 @@ export interface Room {
   readonly pageCount: number;
   readonly pageSize: number;
 
-  /** Sets a layer by name or index. `color` as three takes it; intensity in the layer's unit, default: as it is. */
+  /** Sets a layer by name or index. `color` as three takes it; intensity in the layer's unit, default: as it is. What drove the layer (its
+   *  program, an animation of the file, a bound light) does so no more, until {@link Room.resetLight}. */
   setLight(layer: string | number, color: ColorRepresentation, intensity?: number): void;
-  /** Back to the authored colour. */
+  /** Back to the authored colour, and to the animations of the file. */
   resetLight(layer: string | number): void;
   /** Lets a three.js light drive a layer: its colour × intensity is read every frame, whatever animates it. Returns a function that ends it. */
   bind(light: Light, layer: string | number): () => void;
@@ -128,5 +136,5 @@ export interface Room {
   dispose(): void;
 }
 
-/** Loads a baked folder: `url` is the folder (with its final slash) or its luxel.json. */
+/** Loads a baked folder: `url` is the folder (with its final slash) or its luxel.json. Rejects with an Error that names the file. */
 export function loadLuxel(renderer: WebGLRenderer, url: string | URL, options?: LoadOptions): Promise<Room>;

@@ -70,5 +70,3 @@ export async function loadLuxel(renderer, url, options = {}) {
   onProgress?.(1, total, total);
   return new Room(renderer, runtime, gltf, sky, manifest, options);
 }
-
-export { Runtime } from './runtime.js';
