@@ -57,6 +57,7 @@ export class Panel {
       if (chosen && focus) button.focus();
     }
     if (this.body) this.body.scrollTop = 0;
+    if (key === "about") this.measure(true);
   }
 
   get isOpen() {
@@ -135,7 +136,7 @@ export class Panel {
     const bake = manifest.bake ?? {};
     const cost = [
       ["Pack in memory", bytes(budget.pack)],
-      budget.dense > budget.pack && ["without sparseness", bytes(budget.dense)],
+      budget.dense > 1.02 * budget.pack && ["without sparseness", bytes(budget.dense)],
       ["Accumulators", gpu ? "not used" : bytes(budget.accumulator)],
       ["On the GPU", bytes(gpu ? budget.gpuLayers : budget.gpuComposed)],
       [gpu ? "if summed by the CPU" : "if summed by the GPU", bytes(gpu ? budget.gpuComposed : budget.gpuLayers)],
@@ -228,11 +229,11 @@ export class Panel {
   }
 
   /** Numbers about the last frame, at most four times a second. */
-  measure() {
+  measure(atOnce = false) {
     const now = performance.now();
     const { timing } = this.stage;
     if (timing.interval > 0) this.interval = this.interval ? 0.9 * this.interval + 0.1 * timing.interval : timing.interval;
-    if (now - (this.measured ?? 0) < 250) return;
+    if (!atOnce && now - (this.measured ?? 0) < 250) return;
     this.measured = now;
     if (this.tabs.get("about").pane.hidden) return;
     this.meters.fps.textContent = timing.interval > 0 ? shortNumber(1000 / this.interval) : "at rest";
