@@ -1079,7 +1079,7 @@ def make_tv(b):
         box(w + 0.03, h + 0.03, 0.05, (0, 0, 0.075)), box(0.24, 0.24, 0.07, (0, 0, 0.025), skip="-z")
     )
     b.node("tv_case", (case, "black metal"), at=at)
-    b.node("tv_screen", (quad(w, h, fit=True), "tv"), at=v_add(at, (0, 0, 0.1015)), layer="tv", monitor="6x4")
+    b.node("tv_screen", (quad(w, h, fit=True), "tv"), at=v_add(at, (0, 0, 0.1015)), layer="tv", monitor="4x3")
 
 
 def make_lava_lamp(b, at):

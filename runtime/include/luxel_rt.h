@@ -51,7 +51,7 @@ LXRT_API const char *lxrt_result_name(lxrt_result result);
 
 typedef struct lxrt_pack lxrt_pack;
 
-/// Checks the pack and tells how much memory lxrt_open needs for it (some dozen bytes a layer). No alignment is asked of `data`.
+/// Checks the pack and tells how much memory lxrt_open needs for it (about 100 bytes a layer). No alignment is asked of `data`.
 LXRT_API lxrt_result lxrt_memory_bytes(const void *data, size_t size, size_t *out_bytes);
 /// Checks the pack, hostile ones too, and puts a handle into `memory`. Layers start at their authored colours. `data` and `memory`
 /// must stay as long as the pack is used; `data` is never written to. There is nothing to close.
@@ -175,13 +175,13 @@ typedef enum lxrt_program_kind {
     LXRT_PROGRAM_BLINK,    ///< `high` for the first `duty` of each period, then `low`.
     LXRT_PROGRAM_FLICKER,  ///< Smooth noise between `low` and `high`, a new value every period: flames, tired tubes.
     LXRT_PROGRAM_PULSE,    ///< Raised cosine: `low` at the period's start, `high` in its middle.
-    LXRT_PROGRAM_WHEEL,    ///< Turns the hue once a period, keeping intensity; `color` gives saturation and value.
+    LXRT_PROGRAM_WHEEL,    ///< Turns the hue once a period, from that of `color` on, keeping saturation, value, intensity. White has none to turn.
     LXRT_PROGRAM_SCHEDULE, ///< Keys as steps, fading for `fade_s` into each; repeats every period (24 h: 86400 s).
 } lxrt_program_kind;
 
 typedef enum lxrt_interpolation { LXRT_STEP, LXRT_LINEAR, LXRT_CUBIC } lxrt_interpolation; ///< As glTF's STEP, LINEAR, CUBICSPLINE.
 
-/// A layer's colour as a function of time. Fill with lxrt_program_default(), then change what you need.
+/// A layer's colour as a function of time; formulas: docs/drivers.md. Fill with lxrt_program_default(), then change what you need.
 /// BLINK, FLICKER, PULSE multiply color × intensity by a factor from low to high.
 typedef struct lxrt_program {
     lxrt_program_kind kind;

@@ -9,15 +9,25 @@ enum {
     lxrt_plane_floats = 32, // of sums: a row of 32 texels is 32 reds, 32 greens, 32 blues
     lxrt_row_floats = 3 * lxrt_plane_floats,
     lxrt_sums_floats = 32 * lxrt_row_floats,
-    lxrt_group_layers = 32, // of one job; more of them go through the sums
+    lxrt_group_layers = 4,  // of one job; more of them go through the sums. This job and the next, with the sums, fit a first-level cache
 };
 
-// Present blocks of one place and what their texels are multiplied by.
+// Present blocks of one place and what their texels are multiplied by, in the kernel's own units (rt_kernel_loop.h).
 typedef struct lxrt_group {
     uint32_t count;
     const unsigned char *blocks[lxrt_group_layers];
     float factors[lxrt_group_layers][3];
 } lxrt_group;
+
+// Adds a block to a group that has room for it. Powers of two are exact: |factor| is 2·10^27 at most, and 2^30 times that fits a float.
+static inline void lxrt_group_add(lxrt_group *group, const unsigned char *block, const float factor[3])
+{
+    float *const out = group->factors[group->count];
+    group->blocks[group->count++] = block;
+    out[0] = factor[0] * 0x1p30f;
+    out[1] = factor[1] * 0x1p21f;
+    out[2] = factor[2] * 0x1p16f;
+}
 
 typedef struct lxrt_job {
     const lxrt_group *group; // added in order

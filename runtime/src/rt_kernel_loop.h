@@ -11,16 +11,20 @@ typedef struct sums {
     vfloat r[2], g[2], b[2];
 } sums;
 
-// Adds texel × factor. A mantissa m in a float's top fraction bits under the exponent of 2^(e - 15) is 2^(e - 15) + m 2^(e - 24);
-// what remains after subtracting the power is the texel, exactly.
+// Adds texel × factor. Each mantissa m is put where it lies among the fraction bits of a float whose exponent field holds e + 96 (that
+// is `|`, since 96 has no bit below 32): 2^(e - 31) + m 2^(e - 54 + place). Subtracting 2^(e - 31) leaves the texel's channel times a
+// power of two, exactly, and lxrt_group_add has put the inverse of that power into the factor. One shift is all: blue and e do not
+// lie where a float's fraction and exponent are, but four bits above.
 SIMD static inline void add_texels(vint words, const float factor[3], vfloat *r, vfloat *g, vfloat *b)
 {
-    const vint mask = i_set1(511 << 14);
-    const vint power_bits = i_add(i_shl(i_shr(words, 27), 23), i_set1((127 - 15) << 23));
-    const vfloat power = float_of(power_bits);
-    *r = f_add(*r, f_mul(f_sub(float_of(i_pick(i_shl(words, 14), mask, power_bits)), power), f_set1(factor[0])));
-    *g = f_add(*g, f_mul(f_sub(float_of(i_pick(i_shl(words, 5), mask, power_bits)), power), f_set1(factor[1])));
-    *b = f_add(*b, f_mul(f_sub(float_of(i_pick(i_shr(words, 4), mask, power_bits)), power), f_set1(factor[2])));
+    const vint shifted = i_shr(words, 4);
+    const vint power = i_pick(shifted, i_set1(31 << 23), i_set1(96 << 23));
+    const vfloat red = f_sub(float_of(i_pick(words, i_set1(511), power)), float_of(power));
+    const vfloat green = f_sub(float_of(i_pick(words, i_set1(511 << 9), power)), float_of(power));
+    const vfloat blue = f_sub(float_of(i_pick(shifted, i_set1(511 << 14), power)), float_of(power));
+    *r = f_add(*r, f_mul(red, f_set1(factor[0])));
+    *g = f_add(*g, f_mul(green, f_set1(factor[1])));
+    *b = f_add(*b, f_mul(blue, f_set1(factor[2])));
 }
 
 // RGB9E5 as EXT_texture_shared_exponent says it, rounding halves up. The exponent is that of the largest channel after rounding to nine
@@ -83,10 +87,10 @@ SIMD static inline void run(const lxrt_job *job, const lxrt_format format, const
             const size_t at = 4 * (size_t)(32 * y + x), sums_at = (size_t)lxrt_row_floats * y + x;
             sums s;
             for (int i = 0; i < 2; ++i) {
-                const float *from = job->from + sums_at + lanes * i;
-                s.r[i] = job->from ? f_load(from) : f_set1(0);
-                s.g[i] = job->from ? f_load(from + lxrt_plane_floats) : f_set1(0);
-                s.b[i] = job->from ? f_load(from + 2 * lxrt_plane_floats) : f_set1(0);
+                const float *from = job->from ? job->from + sums_at + lanes * i : NULL;
+                s.r[i] = from ? f_load(from) : f_set1(0);
+                s.g[i] = from ? f_load(from + lxrt_plane_floats) : f_set1(0);
+                s.b[i] = from ? f_load(from + 2 * lxrt_plane_floats) : f_set1(0);
             }
             for (uint32_t k = 0; k < group->count; ++k) {
                 const unsigned char *words = group->blocks[k] + at;

@@ -100,18 +100,6 @@ static void sum_bytes(const lxrt_pack *pack, const picture *from, const uint32_t
     }
 }
 
-static void sum_floats(const picture *from, const part *x, const part *y, double sums[3])
-{
-    for (uint32_t row = y->begin; row < y->end; ++row) {
-        const unsigned char *pixel = from->pixels + row * from->stride + (size_t)x->begin * from->pixel_bytes;
-        for (uint32_t column = x->begin; column < x->end; ++column, pixel += from->pixel_bytes) {
-            float rgb[3];
-            memcpy(rgb, pixel, sizeof rgb); // of any alignment
-            for (int i = 0; i < 3; ++i) sums[i] += isfinite(rgb[i]) ? rgb[i] : 0;
-        }
-    }
-}
-
 // Mean of the linear pixels in a cell.
 static void average_cell(const lxrt_pack *pack, const picture *from, const uint32_t *table, const part *x, int x_count, const part *y,
                          int y_count, double mean[3])
@@ -122,9 +110,10 @@ static void average_cell(const lxrt_pack *pack, const picture *from, const uint3
         for (int i = 0; i < x_count; ++i) {
             const uint64_t share = (uint64_t)x[i].share * y[j].share;
             uint64_t part_whole[3] = {0, 0, 0};
-            double part_real[3] = {0, 0, 0};
+            double part_real[4] = {0, 0, 0, 0};
             if (from->format == LXRT_PIXELS_RGBA32F)
-                sum_floats(from, &x[i], &y[j], part_real);
+                lxrt_sum_floats(from->pixels + y[j].begin * from->stride + (size_t)x[i].begin * from->pixel_bytes, from->stride,
+                                x[i].end - x[i].begin, y[j].end - y[j].begin, part_real);
             else
                 sum_bytes(pack, from, table, &x[i], &y[j], part_whole);
             for (int k = 0; k < 3; ++k) {

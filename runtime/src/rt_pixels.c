@@ -30,6 +30,42 @@ void lxrt_sum_pixels_scalar(const lxrt_pixel_block *block, uint64_t sums[3])
     sums[2] += b;
 }
 
+static void fetch(const unsigned char *bytes, size_t count)
+{
+#if defined(__GNUC__)
+    for (size_t i = 0; i < count; i += 64) __builtin_prefetch(bytes + i);
+#else
+    (void)bytes;
+    (void)count;
+#endif
+}
+
+static void sum_float_row(const unsigned char *pixel, uint32_t width, double sums[4])
+{
+    const uint32_t exponent = 0x7f800000; // all ones: infinite or no number
+    double all[4];
+    memcpy(all, sums, sizeof all);
+    for (uint32_t x = 0; x < width; ++x, pixel += 16) {
+        uint32_t bits[4];
+        float rgba[4];
+        memcpy(bits, pixel, sizeof bits);
+        for (int i = 0; i < 4; ++i) bits[i] = (bits[i] & exponent) == exponent ? 0 : bits[i];
+        memcpy(rgba, bits, sizeof rgba);
+        for (int i = 0; i < 4; ++i) all[i] += rgba[i];
+    }
+    memcpy(sums, all, sizeof all);
+}
+
+void lxrt_sum_floats(const unsigned char *pixels, size_t stride, uint32_t width, uint32_t rows, double sums[4])
+{
+    memset(sums, 0, 4 * sizeof *sums);
+    for (uint32_t y = 0; y < rows; ++y) {
+        const unsigned char *row = pixels + y * stride;
+        if (y + lxrt_rows_ahead < rows) fetch(row + lxrt_rows_ahead * stride, 16 * (size_t)width);
+        sum_float_row(row, width, sums);
+    }
+}
+
 lxrt_pixel_sum lxrt_get_pixel_sum(uint32_t index, const char **out_name)
 {
     struct {

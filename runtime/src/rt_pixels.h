@@ -1,5 +1,7 @@
-// Sums of the linear values of 8-bit sRGB pixels. Whole numbers throughout: every order of adding gives the same bits, so wide kernels
-// and the scalar one agree exactly, here and in WebAssembly.
+// Sums of pixels.
+//
+// Those of 8-bit sRGB pixels are of their linear values, in whole numbers throughout: every order of adding gives the same bits, so wide
+// kernels and the scalar one agree exactly, here and in WebAssembly.
 //
 // With v = 16 h + l a channel's linear value is F(v) = 64 (A[h] + toe[v]) + B[h] l − C[h] l (15 − l): a parabola for each of 16 stretches of
 // the sRGB curve, which a byte shuffle of 16 entries can look up. `toe`, for v < 16 alone, bends the first one where the curve's straight
@@ -15,6 +17,8 @@ enum {
     // Of a block; keeps the 32-bit sums of wide kernels from overflowing: 2^15 steps of 16 pixels, each at most 8 C l (15 − l) = 43008.
     lxrt_max_sum_width = 4096,
     lxrt_max_sum_rows = 128,
+    // Rows of a cell are short and far apart: processors do not guess the next ones by themselves, so they are fetched this much earlier.
+    lxrt_rows_ahead = 4,
 };
 
 static const uint8_t lxrt_srgb_a_low[16] = {0, 84, 179, 145, 32, 137, 242, 123, 66, 101, 254, 36, 240, 121, 210, 17};
@@ -47,6 +51,10 @@ void lxrt_sum_pixels_avx2(const lxrt_pixel_block *block, uint64_t sums[3]);
 #if defined(__wasm_simd128__)
 void lxrt_sum_pixels_wasm(const lxrt_pixel_block *block, uint64_t sums[3]);
 #endif
+
+// The sums of RGBA floats at any address; those that are not finite count as 0. In one order, row by row. Alpha is summed like the others:
+// four alike, without a branch, are what compilers make vectors of.
+void lxrt_sum_floats(const unsigned char *pixels, size_t stride, uint32_t width, uint32_t rows, double sums[4]);
 
 // Kernels that this processor can run, slowest first: 0 is the scalar one. NULL beyond the last. `out_name` may be NULL.
 lxrt_pixel_sum lxrt_get_pixel_sum(uint32_t index, const char **out_name);

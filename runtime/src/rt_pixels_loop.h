@@ -74,7 +74,6 @@ SIMD static inline void add_halves(const half_sums *sums, int64_t out[2])
 SIMD void KERNEL(const lxrt_pixel_block *block, uint64_t sums[3])
 {
     enum { group = width / 4 }; // pixels of a register
-    enum { rows_ahead = 4 };
     const uint32_t pixel_bytes = block->pixel_bytes;
     // Three bytes: the last pixels of a row are left to the scalar kernel, so that nothing behind it is read.
     const uint32_t readable = pixel_bytes == 4 ? block->width : block->width < 2 ? 0 : block->width - 2;
@@ -86,8 +85,7 @@ SIMD void KERNEL(const lxrt_pixel_block *block, uint64_t sums[3])
         half_sums red_green = {zero, zero, zero, zero}, blue = red_green;
         for (uint32_t y = 0; y < block->rows; ++y) {
             const unsigned char *p = block->pixels + y * block->stride;
-            // Rows of a cell are short and far apart: the processor does not guess the next ones by itself.
-            const size_t ahead = y + rows_ahead < block->rows ? rows_ahead * block->stride : 0;
+            const size_t ahead = y + lxrt_rows_ahead < block->rows ? lxrt_rows_ahead * block->stride : 0;
             uint32_t x = 0;
             // Values of 0 add 0: registers without pixels are simply that.
 #define PIXELS(load, bytes)                                                                                                         \

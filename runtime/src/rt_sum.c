@@ -109,8 +109,7 @@ static int next_job(walk *w, lxrt_job *job, lxrt_group *group)
             uint32_t position = w->position;
             group->count = 0;
             while ((block = next_block(w, w->list, entry, &position, &factor)) != NULL && group->count < lxrt_group_layers) {
-                group->blocks[group->count] = block;
-                memcpy(group->factors[group->count++], factor, sizeof group->factors[0]);
+                lxrt_group_add(group, block, factor);
                 w->position = position;
             }
             float *const kept = w->kept ? w->kept->sums + place * lxrt_sums_floats : NULL;

@@ -120,7 +120,7 @@ static void add_head(const lx_report *report, lx_builder *html)
     lx_html_text(html, report->manifest->generator);
     lx_builder_add(html, "\"><title>");
     lx_html_text(html, report->title);
-    lx_builder_add(html, " · Luxel report</title><style>");
+    lx_builder_add(html, " · Luxel report</title><link rel=\"icon\" href=\"data:,\"><style>"); // no request for a favicon.ico
     lx_builder_add(html, style);
     lx_builder_add(html, "</style></head>\n<body><main>\n<header><h1>");
     lx_html_text(html, report->title);

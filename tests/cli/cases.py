@@ -290,6 +290,49 @@ def bake_combined_has_one_layer():
 
 
 @case
+def bake_monitor_has_a_layer_per_cell():
+    write("room.glb", scenes.living_room().to_bytes())
+    luxel("bake", "room.glb", "-o", "room.baked", *FAST, "--no-preview", err="")
+    manifest = json.loads(read("room.baked/luxel.json"))
+    names = [layer["name"] for layer in manifest["layers"]]
+    expect(names == ["lamp", "neon left", "neon right"] + ["tv/%d" % k for k in range(8)], "layers are %s" % names)
+    monitor, = manifest["monitors"]
+    expect((monitor["name"], monitor["columns"], monitor["rows"], monitor["firstLayer"]) == ("tv", 4, 2, 3), str(monitor))
+    expect(monitor["strength"] == [10, 10, 10] and monitor["node"] == 6 and monitor["material"] == 2, str(monitor))
+    expect(manifest["layers"][5]["color"] == [0, 0, 1] and manifest["layers"][8]["color"] == [1, 1, 0], str(manifest["layers"]))
+    text = luxel("inspect", "room.baked").out
+    for word in ("monitors (1)", "animations (2)", "flicker", "dusk"):
+        expect(word in text, "no '%s' in: %s" % (word, text))
+    document = json.loads(luxel("inspect", "room.glb", "--json").out)
+    expect([s["monitor"] for s in document["sources"]] == [None, None, None, "4x2"], str(document["sources"]))
+    expect([s["animate"] for s in document["sources"]] == [None, "flicker", None, None], str(document["sources"]))
+    expect(document["animations"][0]["property"] == "intensity", str(document["animations"]))
+
+
+@case
+def bake_animations_are_listed_with_their_layers():
+    write("room.glb", scenes.living_room().to_bytes())
+    luxel("bake", "room.glb", "-o", "room.baked", *FAST, "--no-preview")
+    animations = json.loads(read("room.baked/luxel.json"))["animations"]
+    expect(animations == [{"name": "", "layer": 1, "program": "flicker", "channel": "light", "duration": animations[0]["duration"]},
+                          {"name": "dusk", "layer": 0, "program": "keys", "channel": "intensity", "duration": 4}], str(animations))
+    luxel("bake", "room.glb", "-o", "combined", *FAST, "--no-preview", "--layers", "combined")
+    manifest = json.loads(read("combined/luxel.json"))
+    expect(manifest["animations"] == [] and manifest["monitors"] == [], "a combined bake has drivers")
+
+
+@case
+def bake_monitors_of_other_grids_cannot_share_a_layer():
+    g = scenes.living_room("2x2")
+    mesh = [node for node in g.json["nodes"] if node["name"] == "tv"][0]["mesh"]
+    g.add_node("a", mesh=mesh, translation=(0, 0.5, 0.8), extras={"luxel_layer": "both"})
+    g.add_node("b", mesh=mesh, translation=(0, 1.5, 0.8), extras={"luxel_layer": "both", "luxel_monitor": "3x2"})
+    write("room.glb", g.to_bytes())
+    refused("bake", "room.glb", "-o", "out", *FAST, code=1, says=["'a' (2x2)", "'b' (3x2)", "luxel_layer"])
+    expect(not os.path.exists("out"), "something was written")
+
+
+@case
 def bake_sky_is_a_layer():
     bake("room.baked", "--no-preview", "--sky", "#ff8040", "--sky-intensity", "50")
     layers = json.loads(read("room.baked/luxel.json"))["layers"]
@@ -415,6 +458,28 @@ def render_baked_folder():
     expect(mean("lit.png") > 0.01, "the picture is black")
     expect(mean("dark.png") == 0, "light with all layers off")
     expect(mean("red.exr") > 0 and mean("albedo.png") > 0 and mean("map.png") > 0, "a picture is black")
+
+
+@case
+def render_monitor_shows_its_picture_until_a_cell_changes():
+    look = ("--eye", "0,0.5,-0.46", "--target", "0,0.5,-0.8", "--size", "64x36", "--samples", "8", "--exposure", "0")  # nothing but the screen
+    for name, monitor in (("plain", None), ("cells", "4x2"), ("half", "2x1")):
+        write(name + ".glb", scenes.living_room(monitor).to_bytes())
+        luxel("bake", name + ".glb", "-o", name + ".baked", *FAST, "--no-preview", "--quiet")
+    for name in ("plain", "cells", "half"):
+        luxel("render", name + ".baked", "-o", name + ".exr", *look)
+
+    def apart(a, b):
+        return json.loads(luxel("compare", a, b, "--json").out)["relative_rmse"]
+    expect(apart("plain.exr", "cells.exr") < 0.02 and apart("plain.exr", "half.exr") < 0.02, "the authored picture is not shown")
+    luxel("render", "half.baked", "-o", "changed.exr", *look, "--set", "tv/1=#808080*10")
+    expect(apart("plain.exr", "changed.exr") > 0.2, "the cells are not shown")
+    luxel("render", "cells.baked", "-o", "off.exr", *look, "--set", "tv/*=off", "--set", "lamp=off", "--set", "neon*=off")
+    expect(mean("off.exr") == 0, "the screen still shines")
+    luxel("render", "cells.baked", "-o", "red.exr", *look, "--set", "*=off", "--set", "tv/0=#ff0000*10")
+    luxel("render", "cells.baked", "-o", "right.exr", *look, "--set", "*=off", "--set", "tv/3=#ff0000*10")
+    # Cell 0 is at the top left, cell 3 at the top right; both give as much light.
+    expect(abs(mean("red.exr") / mean("right.exr") - 1) < 0.1 and apart("red.exr", "right.exr") > 1, "cells 0 and 3 look alike")
 
 
 @case

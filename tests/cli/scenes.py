@@ -24,6 +24,21 @@ def room():
     return g
 
 
+def living_room(monitor="4x2"):
+    """The room with a screen that shows a picture of 4 x 2 pixels, a lamp that flickers, and one that glTF animates."""
+    g = room()
+    colors = [(255, 0, 0), (0, 255, 0), (0, 0, 255), (255, 255, 255), (0, 0, 0), (255, 255, 0), (0, 255, 255), (255, 0, 255)]
+    card = g.add_image("card", 4, 2, bytes(c for color in colors for c in color), wrap=False, nearest=True)
+    screen = g.add_material("screen", (0, 0, 0), emissive=(1, 1, 1), emissive_texture=card, strength=10,
+                            extras={"luxel_monitor": monitor} if monitor else None)
+    g.add_node("tv", mesh=g.add_mesh("tv", (quad(0.8, 0.4, fit=True), screen)), translation=(0, 0.5, -0.8))
+    named = {node["name"]: node for node in g.json["nodes"]}
+    named["neon left"]["extras"] = {"luxel_animate": "flicker 0.1 low=0.5"}
+    pointer = "/extensions/KHR_lights_punctual/lights/0/intensity"  # the lamp's
+    g.add_animation("dusk", (pointer, (0.0, 2.0, 4.0), (10.0, 0.0, 10.0), "LINEAR"))
+    return g
+
+
 def edited(change):
     """The room with its JSON changed by `change(json)`."""
     g = room()

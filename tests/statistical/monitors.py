@@ -166,11 +166,11 @@ def picture_on_a_coarse_grid_is_off_by_what_its_cells_blur():
             wall = scene.add_material("wall", base_color=(0.6, 0.6, 0.6))
             node(scene, "room", mesh=scene.add_mesh("room", (box(3, 2, 2, (0, 1.0, 0)).flip(), wall)))
             return scene
-        truth = bake(lit_room(0, 0), "truth " + name, 64, 8192, 0)
+        truth = bake(lit_room(0, 0), "truth " + name, 48, 16384, 0)
         expected, texels = truth.sum(), truth.texels()
         mean = math.fsum(expected[c][t] for c in range(3) for t in texels) / (3 * len(texels))
         for columns, rows, *tolerances in GRIDS:
-            got = bake(lit_room(columns, rows), "%s %d" % (name, columns), 64, 1024, 0).sum()
+            got = bake(lit_room(columns, rows), "%s %d" % (name, columns), 48, 1024, 0).sum()
             square = math.fsum((got[c][t] - expected[c][t]) ** 2 for c in range(3) for t in texels) / (3 * len(texels))
             total = math.fsum(got[c][t] for c in range(3) for t in texels) / (3 * len(texels))
             measure.note(Row("%s, %d by %d: RMSE of texels over their mean" % (name, columns, rows), mean, total, math.sqrt(square) / mean,

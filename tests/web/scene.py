@@ -2,7 +2,7 @@
 """Writes the small room that these tests bake: scene.py OUT.glb
 
 It holds one of each thing that readers trip over: a texture, instances, an emissive material, a lamp of every kind, an object
-that moves, a mesh whose chart boundaries split vertices, and one that is used twice.
+that moves, a mesh whose chart boundaries split vertices, one that is used twice, a screen, and lights that change over time.
 """
 
 import os
@@ -19,7 +19,10 @@ def room():
     tiles = g.add_material("tiles", texture=g.add_image("tiles", 8, 8, checks))
     white = g.add_material("white", (0.8, 0.8, 0.8))
     red = g.add_material("red", (0.7, 0.1, 0.1))
-    glow = g.add_material("glow", (0, 0, 0), emissive=(0.2, 0.6, 1), strength=20)
+    glow = g.add_material("glow", (0, 0, 0), emissive=(0.2, 0.6, 1), strength=20, extras={"luxel_animate": "blink 2 low=0.2"})
+    bars = bytes(c for _ in range(2) for color in ((255, 0, 0), (0, 255, 0), (0, 0, 255)) for c in color)
+    card = g.add_image("bars", 3, 2, bars, wrap=False, nearest=True)
+    screen = g.add_material("screen", (0, 0, 0), emissive=(1, 1, 1), emissive_texture=card, strength=15)
 
     g.add_node("floor", mesh=g.add_mesh("floor", (quad(4, 4).rotate((1, 0, 0), -90), tiles)))
     g.add_node("wall", mesh=g.add_mesh("wall", (quad(4, 2).translate(0, 1, -2), white)))
@@ -34,6 +37,9 @@ def room():
                instances=[((x, 0.05, 1.2), still, (1, 1, 1)) for x in (-1.0, -0.5, 0.5, 1.0)])
     g.add_node("strip", mesh=g.add_mesh("strip", (box(0.8, 0.1, 0.1), glow)), translation=(0, 1.8, -1.8))
 
+    g.add_node("tv", mesh=g.add_mesh("tv", (quad(0.9, 0.5, fit=True), screen)), translation=(0.9, 1.2, -1.9),
+               extras={"luxel_monitor": "3x2"})
+
     g.add_node("lamp", light=g.add_light("point", 20, (1, 0.8, 0.6)), translation=(-1, 1.8, 0.5))
     g.add_node("spot", light=g.add_light("spot", 40, outer=40), translation=(1.5, 2, 1.5),
                rotation=look((1.5, 2, 1.5), (0, 0, 0)))
@@ -41,6 +47,8 @@ def room():
     g.add_node("panel", translation=(0, 2, 0), rotation=look((0, 2, 0), (0, 0, 0)),
                extras={"luxel_area": "rect 0.5 0.5", "luxel_color": [1, 1, 1], "luxel_intensity": 30})
     eye = (2.5, 1.8, 3.5)
+    g.add_animation("dusk", ("/extensions/KHR_lights_punctual/lights/0/intensity", (0.0, 2.0, 4.0), (20.0, 2.0, 20.0), "LINEAR"),
+                    ("/extensions/KHR_lights_punctual/lights/0/color", (0.0, 4.0), ((1, 0.8, 0.6), (1, 0.4, 0.2)), "STEP"))
     g.add_node("view", camera=g.add_camera("view", 45), translation=eye, rotation=look(eye, (0, 0.5, 0)))
     return g
 
