@@ -11,8 +11,9 @@ export class Panel {
     this.list = list;
     this.atlas = atlas;
     this.tabs = new Map();
+    this.dragged = -1000;
     this.nav = el("div.tabs", { role: "tablist", "aria-label": "Panel" });
-    this.grip = el("button.grip", { type: "button", "aria-label": "Open or close the panel", onclick: () => this.toggle() }, el("span"));
+    this.grip = el("button.grip", { type: "button", "aria-label": "Open or close the panel", onclick: () => performance.now() - this.dragged > 300 && this.toggle() }, el("span"));
     const close = iconButton("close", "Close the panel (P)", () => this.setOpen(false), ".panel-close");
     const bodies = [
       this.#tab("lights", "Lights", list.root),
@@ -87,7 +88,7 @@ export class Panel {
       const way = start === null ? 0 : event.clientY - start;
       start = null;
       if (Math.abs(way) < 24) return;
-      this.grip.addEventListener("click", (click) => click.stopImmediatePropagation(), { once: true, capture: true });
+      this.dragged = performance.now(); // the click that may follow is not meant
       this.setOpen(way < 0);
     });
   }
