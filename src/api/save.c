@@ -125,6 +125,7 @@ static lx_result write_from_folder(lx_bake *bake, const lx_save_desc *desc, cons
         LX_TRY(write_preview(bake, desc, baked, folder, progress, manifest, &picture, error));
         manifest->bake.stages.preview = lx_seconds() - start;
     }
+    manifest->has_report = desc->report;
     LX_TRY(lx_bake_write_manifest(manifest, folder, error));
     if (desc->report) LX_TRY(write_report(bake, baked, folder, manifest, desc->preview ? &picture : NULL, error));
 cleanup:

@@ -275,6 +275,7 @@ lx_result lx_manifest_write(const lx_manifest *manifest, const uint64_t *sizes, 
         put(root, "animations", write_array(manifest, manifest->animation_count, write_animation)) &&
         (!manifest->has_sky || put(root, "sky", write_sky(&manifest->sky))) &&
         (!manifest->has_view || put(root, "view", write_view(manifest))) &&
+        (!manifest->has_report || put(root, "report", text("report.html"))) &&
         (!manifest->memory.ram || put(root, "memory", write_memory(&manifest->memory))) && put(root, "bake", write_bake(&manifest->bake)) &&
         put(root, "hashes", write_hashes(manifest)) && (!sizes || put(root, "sizes", write_sizes(manifest, sizes)));
     if (complete) dump = json_dumps(root, JSON_INDENT(2) | JSON_REAL_PRECISION(9)); // 9 digits hold every float

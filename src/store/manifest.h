@@ -77,6 +77,7 @@ typedef struct lx_manifest {
     lx_manifest_animation *animations;
     uint32_t page_count, layer_count, file_count, monitor_count, animation_count;
     bool has_sky, has_view;
+    bool has_report; ///< report.html is in the folder. Not read: nobody but the viewer asks.
     lx_manifest_sky sky;
     float view_ev;
     lx_budget memory; ///< All 0: not known, and not written. Not read: the pack says it.

@@ -144,8 +144,8 @@ export class LayerList {
     this.solo = solo;
     for (const row of this.rows) if (all || row.layer === layer) row.update();
     for (const group of this.groups) group.update();
-    this.play.textContent = this.model.playing ? "Pause" : "Play";
-    this.play.title = this.model.playing ? "Hold the animations of the file" : "Run the animations of the file";
+    this.play.textContent = this.model.playing ? "Stop" : "Play";
+    this.play.title = this.model.playing ? "Stop the animations of the file: lights as authored" : "Run the animations of the file";
     this.play.setAttribute("aria-pressed", this.model.playing);
   }
 

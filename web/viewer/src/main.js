@@ -144,13 +144,16 @@ async function start() {
   const stage = new Stage(document.getElementById("canvas"));
   stage.canvas.addEventListener("webglcontextlost", () =>
     showProblem(new Problem("The graphics card gave up", ["It may be out of memory, or its driver was restarted.", "Try again; ?method=cpu needs less of its memory."])));
+  stage.canvas.addEventListener("webglcontextrestored", () => {
+    curtain.hidden = true;
+    stage.invalidate();
+  });
   const room = await loadLuxel(stage.renderer, manifestUrl, {
     method,
     wasmUrl: new URL("luxel_rt.wasm", document.baseURI),
     onProgress: showProgress,
   });
   stage.setRoom(room);
-  document.title = `${manifest.scene_name ?? "Luxel"}`;
 
   const model = new Model(room);
   const groups = room.monitors.map((monitor) => new MonitorGroup(stage, model, monitor));

@@ -115,7 +115,7 @@ export class Model {
     this.changed();
   }
 
-  /** Lets the animations of the file run, or holds every layer at its colour. */
+  /** Lets the animations of the file run, or shows what they drive as authored. */
   play(on) {
     this.playing = on;
     if (on) this.room.play();

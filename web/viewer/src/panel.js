@@ -11,8 +11,9 @@ export class Panel {
     this.list = list;
     this.atlas = atlas;
     this.tabs = new Map();
+    this.dragged = -1000;
     this.nav = el("div.tabs", { role: "tablist", "aria-label": "Panel" });
-    this.grip = el("button.grip", { type: "button", "aria-label": "Open or close the panel", onclick: () => this.toggle() }, el("span"));
+    this.grip = el("button.grip", { type: "button", "aria-label": "Open or close the panel", onclick: () => performance.now() - this.dragged > 300 && this.toggle() }, el("span"));
     const close = iconButton("close", "Close the panel (P)", () => this.setOpen(false), ".panel-close");
     const bodies = [
       this.#tab("lights", "Lights", list.root),
@@ -57,6 +58,7 @@ export class Panel {
       if (chosen && focus) button.focus();
     }
     if (this.body) this.body.scrollTop = 0;
+    if (key === "about") this.measure(true);
   }
 
   get isOpen() {
@@ -86,7 +88,7 @@ export class Panel {
       const way = start === null ? 0 : event.clientY - start;
       start = null;
       if (Math.abs(way) < 24) return;
-      this.grip.addEventListener("click", (click) => click.stopImmediatePropagation(), { once: true, capture: true });
+      this.dragged = performance.now(); // the click that may follow is not meant
       this.setOpen(way < 0);
     });
   }
@@ -135,7 +137,7 @@ export class Panel {
     const bake = manifest.bake ?? {};
     const cost = [
       ["Pack in memory", bytes(budget.pack)],
-      budget.dense > budget.pack && ["without sparseness", bytes(budget.dense)],
+      budget.dense > 1.02 * budget.pack && ["without sparseness", bytes(budget.dense)],
       ["Accumulators", gpu ? "not used" : bytes(budget.accumulator)],
       ["On the GPU", bytes(gpu ? budget.gpuLayers : budget.gpuComposed)],
       [gpu ? "if summed by the CPU" : "if summed by the GPU", bytes(gpu ? budget.gpuComposed : budget.gpuLayers)],
@@ -228,11 +230,11 @@ export class Panel {
   }
 
   /** Numbers about the last frame, at most four times a second. */
-  measure() {
+  measure(atOnce = false) {
     const now = performance.now();
     const { timing } = this.stage;
     if (timing.interval > 0) this.interval = this.interval ? 0.9 * this.interval + 0.1 * timing.interval : timing.interval;
-    if (now - (this.measured ?? 0) < 250) return;
+    if (!atOnce && now - (this.measured ?? 0) < 250) return;
     this.measured = now;
     if (this.tabs.get("about").pane.hidden) return;
     this.meters.fps.textContent = timing.interval > 0 ? shortNumber(1000 / this.interval) : "at rest";
