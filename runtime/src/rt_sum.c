@@ -3,7 +3,10 @@
 
 #include <math.h>
 
-enum { listed_layers = 128 };
+enum {
+    listed_layers = 128,
+    sums_cost = 3, // reading a block's sums moves as many bytes as reading three layers of it
+};
 
 // The layers that are not black, found once per call; should there be more than fit, the others are looked for in every block.
 typedef struct layer_list {
@@ -73,13 +76,13 @@ static uint32_t count_present(const walk *w, const layer_list *list, size_t entr
     return count;
 }
 
-// What to do about a block of kept sums: nothing, adding the changes, or all anew, which is as cheap when most layers have changed.
+// What to do about a block of kept sums: nothing, adding the changes, or all anew where that reads no more.
 static const layer_list *choose_list(const walk *w, size_t entry)
 {
     if (!w->kept || w->kept->afresh) return &w->all;
     const uint32_t changed = count_present(w, &w->changed, entry);
     if (changed == 0) return NULL;
-    return changed < count_present(w, &w->all, entry) ? &w->changed : &w->all;
+    return changed + sums_cost < count_present(w, &w->all, entry) ? &w->changed : &w->all;
 }
 
 // The next job of the walk; 0 at its end.
