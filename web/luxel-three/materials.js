@@ -132,6 +132,17 @@ const throughGlass = `
 #endif
 `;
 
+// There are no local reflections: three reflects the sky through walls. What arrives at a place compared with what would arrive under the
+// open sky says how much of it is to be seen from there, roughly; without it, daylight would shine from every table of a closed room.
+const skyOcclusion = /* glsl */ `
+#if defined(USE_ENVMAP)
+  float luxelOpen = min(1.0, luminance(irradiance) / max(luminance(iblIrradiance), 1e-6));
+  radiance *= luxelOpen;
+  iblIrradiance *= luxelOpen;
+  clearcoatRadiance *= luxelOpen;
+#endif
+`;
+
 // In the place of tone mapping, which views of the data go without. Albedo is the bake's: of metal a little is left to the lightmap.
 function viewCode(lit, standard) {
   const lightmap = lit ? 'luxelIrradiance() * RECIPROCAL_PI * luxelExposure' : 'vec3(0.0)';
@@ -231,7 +242,7 @@ export class Materials {
     if (standard) {
       pars += 'uniform vec3 luxelSky;\n';
       fragment = replace(fragment, '#include <lights_pars_begin>', lightsPars);
-      fragment = insert(fragment, '#include <lights_fragment_maps>', skyTint);
+      fragment = insert(fragment, '#include <lights_fragment_maps>', lit ? skyTint + skyOcclusion : skyTint);
     }
     if (lit) {
       pars += irradiance(this.#method, this.#filter);

@@ -17,6 +17,7 @@ const PLACES = {
   pebbleLeft: [0.11, 0.905, 0.17, 0.95],
   pebbleRight: [0.83, 0.905, 0.89, 0.95],
   sign: [0.31, 0.28, 0.355, 0.305],
+  ball: [0.47, 0.72, 0.53, 0.8],
   drone: [0.49, 0.235, 0.51, 0.265],
 };
 
@@ -250,21 +251,25 @@ test('ambient light and the diffuse light of the environment add nothing to lit 
     window.room.scene.add(ambient);
     const after = window.look();
     ambient.removeFromParent();
-    // A strong environment: what the white, rough floor reflects of it is its 4 % of specular light.
-    window.only({ sky: ['white', 0] });
+    // The sky alone: its diffuse light is in the lightmap, its reflections are the environment's.
+    window.only({ sky: ['white', 5] });
+    const sky = window.look();
+    window.room.scene.environmentIntensity = 0;
+    const matt = window.look();
+    // An environment that the lightmap knows nothing of: no light gets there, so nothing is reflected either.
+    window.only({});
     window.look();
     window.room.scene.environmentIntensity = 3;
-    const pixels = window.look();
-    window.room.scene.environmentIntensity = 0;
-    const none = window.look();
-    return { before, after, pixels, none };
+    const unknown = window.look();
+    window.reset();
+    return { before, after, sky, matt, unknown };
   });
   assert.ok(sum(seen.after.drone) > 300, 'what is not baked takes ambient light');
   assert.deepEqual({ ...seen.after, drone: null }, { ...seen.before, drone: null });
-  assert.ok(isBlack(seen.none.leftWall));
-  assert.ok(sum(seen.pixels.leftWall) > 3, 'specular reflections of the environment stay');
-  // The drone is not baked: it gets the diffuse light, too. 4 % and 70 % are bytes of 53 and 218 in sRGB.
-  assert.ok(sum(seen.pixels.leftWall) < 0.5 * sum(seen.pixels.drone), `wall ${seen.pixels.leftWall}, drone ${seen.pixels.drone}`);
+  assert.ok(sum(seen.sky.ball) > sum(seen.matt.ball) + 10, `the ball reflects the sky: ${seen.sky.ball}, without ${seen.matt.ball}`);
+  // 4 % of what arrives, and more only at grazing angles.
+  assert.ok(sum(seen.sky.back) > sum(seen.matt.back) && sum(seen.sky.back) < 1.3 * sum(seen.matt.back), `${seen.sky.back} and ${seen.matt.back}`);
+  assert.ok(sum(seen.unknown.drone) > 200 && isBlack(seen.unknown.back), `${seen.unknown.drone} and ${seen.unknown.back}`);
 });
 
 test('lightmap and albedo views show data without tone mapping', needsBaked, async () => {
