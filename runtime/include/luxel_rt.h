@@ -132,18 +132,20 @@ LXRT_API lxrt_result lxrt_compose(const lxrt_pack *pack, const lxrt_region *regi
 ///
 /// After lxrt_accumulator_begin, every level's region from lxrt_accumulator_bounds is handed to lxrt_accumulator_update, in parts
 /// on block borders (multiples of 32 texels, or the page's edge) and by as many threads as one likes. Targets must keep what
-/// earlier updates wrote: blocks in which nothing changed are skipped. Every 64th begin asks for all of it, so that rounding does
-/// not pile up; in between the result is within some roundings of lxrt_compose.
+/// earlier updates wrote: blocks in which nothing changed are skipped. The first begin asks for all of it, and so does every 64th
+/// after a change, so that rounding does not pile up: until then the result is within some roundings of lxrt_compose, from then on,
+/// if nothing changes any more, it is the same to the bit.
 typedef struct lxrt_accumulator lxrt_accumulator;
-/// Memory for the accumulator of one page: 12 bytes a texel, all mip levels.
+/// Memory for the accumulator of one page: 12 bytes a texel of whole blocks, all mip levels, and some dozen bytes a layer.
 LXRT_API size_t lxrt_accumulator_bytes(const lxrt_pack *pack);
 LXRT_API lxrt_result lxrt_accumulator_create(const lxrt_pack *pack, uint32_t page, void *memory, size_t memory_bytes,
                                              lxrt_accumulator **out_accumulator);
-/// Notes the colours of now; what was begun before must be updated whole. Returns how many layers changed on this page; 0: nothing to do.
+/// Notes the colours of now; what was begun before must be updated whole. Returns how many layers changed on this page, at
+/// least 1 when all of it is asked for; 0: nothing to do.
 LXRT_API uint32_t lxrt_accumulator_begin(lxrt_accumulator *accumulator);
 /// Makes the next begin ask for the whole page, e.g. when targets were lost.
 LXRT_API void lxrt_accumulator_reset(lxrt_accumulator *accumulator);
-/// The smallest rectangle of whole blocks that holds all changes of this update on a level; width 0: none. 
+/// The smallest rectangle of whole blocks that holds all changes of this update on a level; width 0: none.
 LXRT_API lxrt_result lxrt_accumulator_bounds(const lxrt_accumulator *accumulator, uint32_t level, lxrt_region *out);
 /// Adds and writes a part of the page. Each block once between two begins. Several threads may work on different blocks.
 LXRT_API lxrt_result lxrt_accumulator_update(lxrt_accumulator *accumulator, const lxrt_region *region, const lxrt_target *target);

@@ -71,13 +71,14 @@ lxrt_pixel_sum lxrt_get_pixel_sum(uint32_t index, const char **out_name)
     struct {
         lxrt_pixel_sum sum;
         const char *name;
-    } sums[3] = {{lxrt_sum_pixels_scalar, "scalar"}};
+    } sums[4] = {{lxrt_sum_pixels_scalar, "scalar"}};
     uint32_t count = 1;
 #define ADD(which) (sums[count].sum = lxrt_sum_pixels_##which, sums[count++].name = #which)
 #if defined(__x86_64__)
     __builtin_cpu_init();
     if (__builtin_cpu_supports("ssse3")) ADD(ssse3);
     if (__builtin_cpu_supports("avx2")) ADD(avx2);
+    if (__builtin_cpu_supports("avx512bw")) ADD(avx512);
 #endif
 #if defined(__wasm_simd128__)
     ADD(wasm);

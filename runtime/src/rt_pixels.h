@@ -47,6 +47,7 @@ void lxrt_sum_pixels_scalar(const lxrt_pixel_block *block, uint64_t sums[3]);
 #if defined(__x86_64__)
 void lxrt_sum_pixels_ssse3(const lxrt_pixel_block *block, uint64_t sums[3]);
 void lxrt_sum_pixels_avx2(const lxrt_pixel_block *block, uint64_t sums[3]);
+void lxrt_sum_pixels_avx512(const lxrt_pixel_block *block, uint64_t sums[3]);
 #endif
 #if defined(__wasm_simd128__)
 void lxrt_sum_pixels_wasm(const lxrt_pixel_block *block, uint64_t sums[3]);

@@ -6,7 +6,7 @@
 
 #define SIMD __attribute__((target("avx2")))
 
-enum { width = 32 };
+enum { width = 32, granule = width / 4, excess = 4 };
 typedef __m256i vbytes;
 
 #define v_splat(a) _mm256_set1_epi8(a)
@@ -50,6 +50,10 @@ SIMD static inline void v_store(int32_t *out, vbytes v)
 {
     _mm256_storeu_si256((vbytes *)(void *)out, v);
 }
+
+// Wholes or nothing.
+#define v_part4(p, count) ((count) > 0 ? v_load4(p) : v_splat(0))
+#define v_part3(p, count) ((count) > 0 ? v_load3(p) : v_splat(0))
 
 #define KERNEL lxrt_sum_pixels_avx2
 #include "rt_pixels_loop.h"

@@ -1,8 +1,10 @@
 // The wide kernel, written once: a .c file defines the words below for its instruction set, then KERNEL, and includes this.
 //
 //     SIMD             attributes of functions
-//     vbytes, width    a register and its bytes, 16 or 32; all happens within lanes of 16
-//     v_load4, v_load3 width / 4 pixels of four or three bytes, four pixels a lane. Of three bytes 4 more are read
+//     vbytes, width    a register and its bytes, 16, 32 or 64; all happens within lanes of 16
+//     v_load4, v_load3 width / 4 pixels of four or three bytes, four pixels a lane
+//     granule          pixels of which v_part4 and v_part3, which read some of those and 0 for the rest, take whole numbers
+//     excess           bytes that v_load3 and v_part3 read behind the pixels
 //     v_table          16 bytes, the same in every lane
 //     v_lookup         table[i] of each byte i of the second; they are below 16
 //     v_lookup_first   the same of any bytes, 0 where they are 16 or more
@@ -75,9 +77,9 @@ SIMD void KERNEL(const lxrt_pixel_block *block, uint64_t sums[3])
 {
     enum { group = width / 4 }; // pixels of a register
     const uint32_t pixel_bytes = block->pixel_bytes;
-    // Three bytes: the last pixels of a row are left to the scalar kernel, so that nothing behind it is read.
-    const uint32_t readable = pixel_bytes == 4 ? block->width : block->width < 2 ? 0 : block->width - 2;
-    const uint32_t wide = readable / group * group;
+    // Of three bytes: the last pixels of a row are left to the scalar kernel, so that nothing behind it is read.
+    const uint32_t left = pixel_bytes == 4 ? 0 : (excess + 2) / 3;
+    const uint32_t wide = block->width < left ? 0 : (block->width - left) / granule * granule;
     if (wide > 0) {
         const vbytes zero = v_splat(0);
         const tables t = {v_table(lxrt_srgb_a_low), v_table(lxrt_srgb_a_high), v_table(lxrt_srgb_b_low), v_table(lxrt_srgb_b_high),
@@ -88,21 +90,23 @@ SIMD void KERNEL(const lxrt_pixel_block *block, uint64_t sums[3])
             const size_t ahead = y + lxrt_rows_ahead < block->rows ? lxrt_rows_ahead * block->stride : 0;
             uint32_t x = 0;
             // Values of 0 add 0: registers without pixels are simply that.
-#define PIXELS(load, bytes)                                                                                                         \
+#define PART(bytes, number) v_part##bytes(p + number * group * bytes, wide - x > number * group ? wide - x - number * group : 0)
+#define PIXELS(bytes)                                                                                                               \
     for (; x + 4 * group <= wide; x += 4 * group, p += 4 * group * bytes) {                                                         \
         v_prefetch(p + ahead);                                                                                                      \
         v_prefetch(p + ahead + 2 * group * bytes);                                                                                  \
-        add_pixels(&t, load(p), load(p + group * bytes), load(p + 2 * group * bytes), load(p + 3 * group * bytes), &red_green, &blue); \
+        add_pixels(&t, v_load##bytes(p), v_load##bytes(p + group * bytes), v_load##bytes(p + 2 * group * bytes),                    \
+                   v_load##bytes(p + 3 * group * bytes), &red_green, &blue);                                                        \
     }                                                                                                                               \
     if (x < wide)                                                                                                                   \
-        add_pixels(&t, load(p), x + group < wide ? load(p + group * bytes) : zero,                                                  \
-                   x + 2 * group < wide ? load(p + 2 * group * bytes) : zero, zero, &red_green, &blue);
+        add_pixels(&t, PART(bytes, 0), PART(bytes, 1), PART(bytes, 2), PART(bytes, 3), &red_green, &blue);
             if (pixel_bytes == 4) {
-                PIXELS(v_load4, 4)
+                PIXELS(4)
             } else {
-                PIXELS(v_load3, 3)
+                PIXELS(3)
             }
 #undef PIXELS
+#undef PART
         }
         int64_t red_green_sums[2] = {0, 0}, blue_sums[2] = {0, 0};
         add_halves(&red_green, red_green_sums);

@@ -6,7 +6,7 @@
 
 #define SIMD __attribute__((target("ssse3")))
 
-enum { width = 16 };
+enum { width = 16, granule = width / 4, excess = 4 };
 typedef __m128i vbytes;
 
 #define v_splat(a) _mm_set1_epi8(a)
@@ -48,6 +48,10 @@ SIMD static inline void v_store(int32_t *out, vbytes v)
 {
     _mm_storeu_si128((vbytes *)(void *)out, v);
 }
+
+// Wholes or nothing.
+#define v_part4(p, count) ((count) > 0 ? v_load4(p) : v_splat(0))
+#define v_part3(p, count) ((count) > 0 ? v_load3(p) : v_splat(0))
 
 #define KERNEL lxrt_sum_pixels_ssse3
 #include "rt_pixels_loop.h"

@@ -6,7 +6,7 @@
 
 #define SIMD
 
-enum { width = 16 };
+enum { width = 16, granule = width / 4, excess = 4 };
 typedef v128_t vbytes;
 
 #define v_splat(a) wasm_i8x16_splat(a)
@@ -35,6 +35,10 @@ static inline vbytes v_dot8(vbytes a, vbytes b)
     return wasm_i16x8_add(wasm_i16x8_mul(wasm_v128_and(a, low), wasm_v128_and(b, low)),
                           wasm_i16x8_mul(wasm_u16x8_shr(a, 8), wasm_u16x8_shr(b, 8)));
 }
+
+// Wholes or nothing.
+#define v_part4(p, count) ((count) > 0 ? v_load4(p) : v_splat(0))
+#define v_part3(p, count) ((count) > 0 ? v_load3(p) : v_splat(0))
 
 #define KERNEL lxrt_sum_pixels_wasm
 #include "rt_pixels_loop.h"

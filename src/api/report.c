@@ -32,7 +32,7 @@ static const char style[] =
     ".figures{display:grid;grid-template-columns:repeat(auto-fit,minmax(8.5rem,1fr));gap:1px;background:var(--card);"
     "border:1px solid var(--line);border-radius:10px;overflow:hidden;margin-top:20px}"
     ".figures div{padding:12px 14px;box-shadow:0 0 0 1px var(--line)}"
-    ".figures b{display:block;font-size:1.35rem;font-weight:600;letter-spacing:-.02em;font-variant-numeric:tabular-nums}"
+    ".figures b{display:block;font-size:1.2rem;white-space:nowrap;font-weight:600;letter-spacing:-.02em;font-variant-numeric:tabular-nums}"
     ".figures span{color:var(--soft);font-size:.8rem}"
     ".warn{background:var(--warn);border:1px solid var(--warnline);border-radius:10px;padding:12px 18px;margin-top:20px}"
     ".warn ul{margin:.3em 0 0;padding-left:1.1em}.warn li{margin:.25em 0}"

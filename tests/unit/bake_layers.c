@@ -1,8 +1,14 @@
+#define _POSIX_C_SOURCE 200809L // mkdtemp
+
 // Layers of monitors and what drives layers: names, groups, colours, and what is refused or told.
 #include "bake/animations.h"
+#include "bake/baked.h"
+#include "bake/save.h"
 #include "unit/scene_fixture.h"
 
 #include "luxel/bake.h"
+
+#include <unistd.h>
 
 // A quad with TEXCOORD_0 = (0,0) at its top left; scalar keys 0 1 2 (accessor 3), values 10 20 40 (4).
 static void quad_bin(void)
@@ -274,6 +280,70 @@ static void animation_of_a_monitor_is_told(void **state)
     release(&l);
 }
 
+// A PNG of 4 × 2 texels: red, green, blue, white over black, a dark grey, yellow, magenta.
+#define PICTURE                                                                                                                          \
+    ",'textures':[{'source':0,'sampler':0}],'samplers':[{'wrapS':33071,'wrapT':33071}],'images':[{'uri':'data:image/png;base64,"          \
+    "iVBORw0KGgoAAAANSUhEUgAAAAQAAAACCAIAAADwyuo0AAAAGUlEQVR42mP4z8DAAMZAAKQYbGxsgAwgBACAPwqrK7Y/GgAAAABJRU5ErkJggg=='}]"
+
+static lx_baked *save_and_open(layered *l, const char *out)
+{
+    const lx_save_desc desc = {0};
+    lx_new_folder folder = {0};
+    lx_manifest manifest = {0};
+    lx_baked *baked = NULL;
+    lx_error error = {0};
+    lx_result result = lx_new_folder_begin(out, &folder, &error);
+    if (result == LX_OK) result = lx_bake_write(l->bake, &desc, &folder, NULL, &manifest, &error);
+    if (result == LX_OK) result = lx_bake_write_manifest(&manifest, &folder, &error);
+    if (result == LX_OK) result = lx_new_folder_commit(&folder, &error);
+    lx_manifest_release(&manifest);
+    lx_new_folder_abort(&folder);
+    if (result == LX_OK) result = lx_baked_open(fixture_context, out, true, &baked, &error);
+    if (result != LX_OK) fail_msg("%s", error.message);
+    return baked;
+}
+
+// What the importer makes of the file's own picture is what the runtime makes of the same pixels, so that a video that begins with it does not jump.
+static void runtime_given_the_authored_picture_gives_the_authored_cells(void **state)
+{
+    (void)state;
+    static const uint8_t pixels[24] = {255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255, 0, 0, 0, 60, 60, 60, 255, 255, 0, 255, 0, 255};
+    static const char *const grids[] = {"4x2", "3x1", "1x1", "5x3"};
+    char root[] = "/tmp/luxel-layers-XXXXXX";
+    assert_non_null(mkdtemp(root));
+    for (size_t g = 0; g < sizeof grids / sizeof *grids; ++g) {
+        char members[4096], out[64], command[128];
+        snprintf(members, sizeof members,
+                 QUAD ",'materials':[{'emissiveFactor':[1,0.5,1],'emissiveTexture':{'index':0}," STRENGTH(20) ",'extras':{'luxel_monitor':'%s'}},{}]"
+                 PICTURE ",'nodes':[{'name':'tv','mesh':0}]", grids[g]);
+        snprintf(out, sizeof out, "%s/%zu.baked", root, g);
+        layered l = build(members, false, LX_OK);
+        lx_baked *baked = save_and_open(&l, out);
+        assert_non_null(lx_baked_monitor(baked, 0));
+        assert_false(lx_baked_monitor_shows_cells(baked, lx_baked_monitor(baked, 0)));
+        lxrt_monitor monitor;
+        assert_int_equal(lxrt_get_monitor(baked->pack, 0, &monitor), LXRT_OK);
+        assert_string_equal(monitor.name, "tv");
+        assert_near(monitor.strength[1], 10, 0);
+        assert_int_equal(lxrt_monitor_update(baked->pack, 0, pixels, 4, 2, 0, LXRT_PIXELS_RGB8_SRGB), LXRT_OK);
+        for (uint32_t layer = 0; layer < l.bake->layer_count; ++layer) {
+            float c[3];
+            lxrt_get_layer(baked->pack, layer, c);
+            for (int i = 0; i < 3; ++i) assert_near(c[i], l.bake->layers[layer].color[i] * l.bake->layers[layer].intensity, 1e-3);
+        }
+        // A frame of one colour: every cell is exactly that, and the monitor shows cells from now on.
+        uint8_t white[24];
+        memset(white, 255, sizeof white);
+        assert_int_equal(lxrt_monitor_update(baked->pack, 0, white, 4, 2, 0, LXRT_PIXELS_RGB8_SRGB), LXRT_OK);
+        assert_true(lx_baked_monitor_shows_cells(baked, lx_baked_monitor(baked, 0)));
+        lx_baked_destroy(baked);
+        release(&l);
+        snprintf(command, sizeof command, "rm -r %s", out);
+        assert_int_equal(system(command), 0);
+    }
+    rmdir(root);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -293,6 +363,7 @@ int main(void)
         cmocka_unit_test(layer_of_two_lamps_is_not_driven_by_one),
         cmocka_unit_test(group_of_one_animated_lamp_that_is_off_keeps_its_proportions),
         cmocka_unit_test(animation_of_a_monitor_is_told),
+        cmocka_unit_test(runtime_given_the_authored_picture_gives_the_authored_cells),
     };
     return cmocka_run_group_tests_name("bake layers", tests, fixture_setup, fixture_teardown);
 }

@@ -25,9 +25,13 @@ static void fill(lx_manifest *manifest)
         .pages = calloc(2, sizeof *manifest->pages),
         .layers = calloc(2, sizeof *manifest->layers),
         .files = calloc(2, sizeof *manifest->files),
+        .monitors = calloc(2, sizeof *manifest->monitors),
+        .animations = calloc(1, sizeof *manifest->animations),
         .page_count = 2,
         .layer_count = 2,
         .file_count = 2,
+        .monitor_count = 2,
+        .animation_count = 1,
         .has_sky = true,
         .has_view = true,
         .sky = {"sky.exr", {1, 0.5f, 0.25f}, 45, 3},
@@ -42,6 +46,9 @@ static void fill(lx_manifest *manifest)
     manifest->layers[1] = (lx_manifest_layer){"sky", "sky", "", "nt", "baked", {1, 1, 1}, 1e-20f, 0x1p-30f};
     manifest->files[0] = (lx_manifest_file){0, 0, "ktx2", "lightmap_page0.ktx2"};
     manifest->files[1] = (lx_manifest_file){1, 1, "exr", "lightmap_page1_sky.exr"};
+    manifest->monitors[0] = (lx_manifest_monitor){"tv \"1\"", 7, 3, 2, 1, 0, {0.1f, 18, 1e9f}};
+    manifest->monitors[1] = (lx_manifest_monitor){"bare", 8, -1, 1, 1, 1, {1, 1, 1}};
+    manifest->animations[0] = (lx_manifest_animation){"dusk", 1, "keys", "color", 12.1f};
 }
 
 static void manifest_round_trip_keeps_every_bit(void **state)
@@ -79,6 +86,20 @@ static void manifest_round_trip_keeps_every_bit(void **state)
         assert_int_equal(back.files[i].page, manifest.files[i].page);
         assert_int_equal(back.files[i].layer, manifest.files[i].layer);
     }
+    assert_int_equal(back.monitor_count, 2);
+    for (int i = 0; i < 2; ++i) {
+        const lx_manifest_monitor *a = &back.monitors[i], *b = &manifest.monitors[i];
+        assert_string_equal(a->name, b->name);
+        assert_true(a->node == b->node && a->material == b->material && a->columns == b->columns && a->rows == b->rows);
+        assert_int_equal(a->first_layer, b->first_layer);
+        assert_memory_equal(a->strength, b->strength, 12);
+    }
+    assert_int_equal(back.animation_count, 1);
+    assert_string_equal(back.animations[0].name, "dusk");
+    assert_int_equal(back.animations[0].layer, 1);
+    assert_string_equal(back.animations[0].program, "keys");
+    assert_string_equal(back.animations[0].channel, "color");
+    assert_memory_equal(&back.animations[0].duration_s, &manifest.animations[0].duration_s, 4);
     assert_true(back.has_sky && back.has_view);
     assert_string_equal(back.sky.file, "sky.exr");
     assert_memory_equal(back.sky.color, manifest.sky.color, 12);
@@ -168,6 +189,16 @@ static void manifest_with_wrong_fields_names_them(void **state)
         {"[1,1,1]", "[1,1]", "layers[0].color: must be three numbers", LX_ERROR_FORMAT},
         {"[1,1,1]", "[1,1,1e60]", "layers[0].color: is out of range", LX_ERROR_FORMAT},
         {"\"unknown\":{}", "\"files\":[{\"page\":1,\"layer\":0,\"format\":\"exr\",\"file\":\"x\"}]", "files[0]", LX_ERROR_FORMAT},
+        {"\"unknown\":{}", "\"monitors\":[{\"name\":\"m\",\"node\":0,\"columns\":2,\"rows\":1,\"firstLayer\":0,\"strength\":[1,1,1]}]",
+         "monitors[0].columns, rows, firstLayer: there are no such layers", LX_ERROR_FORMAT},
+        {"\"unknown\":{}", "\"monitors\":[{\"name\":\"m\",\"node\":0,\"columns\":65536,\"rows\":65536,\"firstLayer\":0,\"strength\":[1,1,1]}]",
+         "monitors[0].columns, rows, firstLayer: there are no such layers", LX_ERROR_FORMAT},
+        {"\"unknown\":{}", "\"monitors\":[{\"name\":\"m\",\"node\":0,\"columns\":1,\"rows\":1,\"firstLayer\":1,\"strength\":[1,1,1]}]",
+         "monitors[0].columns, rows, firstLayer: there are no such layers", LX_ERROR_FORMAT},
+        {"\"unknown\":{}", "\"monitors\":[{\"name\":\"m\",\"node\":0,\"columns\":1,\"rows\":1,\"firstLayer\":0}]",
+         "monitors[0].strength: must be three numbers", LX_ERROR_FORMAT},
+        {"\"unknown\":{}", "\"animations\":[{\"layer\":1,\"program\":\"keys\"}]", "animations[0].layer: there is no such layer", LX_ERROR_FORMAT},
+        {"\"unknown\":{}", "\"animations\":[{\"layer\":0}]", "animations[0].program: is missing", LX_ERROR_FORMAT},
         {"\"unknown\":{}", "\"sky\":{\"file\":\"a/../../b\",\"color\":[1,1,1]}", "sky.file", LX_ERROR_FORMAT},
         {"\"unknown\":{}", "\"hashes\":{\"luxel.pack\":\"12\"}", "hashes.luxel.pack", LX_ERROR_FORMAT},
         {"\"layers\":[", "\"layers\":[[],", "layers[0].name", LX_ERROR_FORMAT},

@@ -2,30 +2,23 @@
 import { AnimationMixer, Color, InstancedBufferAttribute, InstancedBufferGeometry, BufferGeometry, Scene } from 'three';
 import { ComposedPages, LayeredPages, measureCompose } from './lightmap.js';
 import { createUniforms, Materials, VIEWS } from './materials.js';
+import { autoMethod } from './method.js';
 import { Monitor, Screen } from './monitors.js';
 import { KINDS, NONE } from './runtime.js';
 
 const PROGRAM_KINDS = ['constant', 'keys', 'blink', 'flicker', 'pulse', 'wheel', 'schedule'];
 const UNITS = { point: 'cd', spot: 'cd', directional: 'lx' };
 
-// The rule of docs/web.md: the sum per pixel pays where composing would take longer than half a frame, and only for so few layers that
-// their fetches do not take longer than that on a small GPU.
-const MOST_COMPOSE_MS = 8;
-const MOST_GPU_LAYERS = 16;
-
-function chooseMethod({ method = 'auto', gpuMemoryLimit = 256 * 1048576 }, runtime, renderer) {
+function chooseMethod({ method = 'auto', gpuMemoryLimit }, runtime, renderer) {
   const { layerCount, pageCount } = runtime.info;
   const gl = renderer.getContext();
-  const gpuLayersBytes = runtime.budget().gpuLayers;
-  const composeMs = measureCompose(runtime);
-  const fits = layerCount * pageCount <= gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS);
+  const slicesLimit = gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS);
+  const methodReason = { composeMs: measureCompose(runtime), layers: layerCount, gpuLayersBytes: runtime.budget().gpuLayers };
   if (!['auto', 'cpu', 'gpu'].includes(method)) throw new Error(`luxel: "${method}" is no method`);
-  if (method === 'gpu' && !fits) throw new Error(`luxel: method gpu: ${layerCount} layers of ${pageCount} pages are more than the GPU takes`);
-  if (method === 'auto') {
-    const gpu = fits && gpuLayersBytes <= gpuMemoryLimit && layerCount <= MOST_GPU_LAYERS && composeMs > MOST_COMPOSE_MS;
-    method = gpu ? 'gpu' : 'cpu';
-  }
-  return { method, methodReason: { composeMs, layers: layerCount, gpuLayersBytes } };
+  if (method === 'gpu' && layerCount * pageCount > slicesLimit)
+    throw new Error(`luxel: method gpu: ${layerCount} layers of ${pageCount} pages are more than the ${slicesLimit} slices this GPU takes`);
+  if (method === 'auto') method = autoMethod({ ...methodReason, slices: layerCount * pageCount, slicesLimit, gpuMemoryLimit });
+  return { method, methodReason };
 }
 
 // A geometry with the same buffers.

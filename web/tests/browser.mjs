@@ -25,9 +25,11 @@ export async function openPage(browser, url, options = {}) {
   const context = await browser.newContext(options);
   const page = await context.newPage();
   const complaints = [];
+  const said = []; // everything, complaints too
   const foreign = [];
   page.on('console', (message) => {
     const text = message.text();
+    said.push(text);
     if (['error', 'warning'].includes(message.type()) && !OWN_REMARKS.some((remark) => remark.test(text))) complaints.push(`${message.type()}: ${text}`);
   });
   page.on('pageerror', (error) => complaints.push(`exception: ${error.stack ?? error.message}`));
@@ -42,6 +44,7 @@ export async function openPage(browser, url, options = {}) {
     page,
     context,
     complaints,
+    said,
     assertClean() {
       assert.deepEqual(complaints, []);
       assert.deepEqual(foreign, []);

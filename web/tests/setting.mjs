@@ -15,18 +15,22 @@ const { LUXEL_WEB_BAKED: baked, LUXEL_WASM: wasm } = process.env;
 /** Goes into the options of test(): skips with a reason when there is nothing to look at. */
 export const needsBaked = baked && wasm ? {} : { skip: 'LUXEL_WEB_BAKED and LUXEL_WASM do not name a baked folder and the runtime' };
 
-/** A page with the stage on it. `close()` it. */
-export async function openStage() {
+/** A page with the stage on it, or another one of `routes`. `close()` it. */
+export async function openStage(routes = {}, name = 'stage.html') {
+  const runtime = (path, response) => response.writeHead(200, { 'Content-Type': 'application/wasm' }).end(readFileSync(wasm));
   const server = await serve({
     '/': here,
     '/three/': three,
     '/luxel-three/': join(here, '..', 'luxel-three'),
     '/baked/': baked,
-    '/luxel_rt.wasm': (path, response) => response.writeHead(200, { 'Content-Type': 'application/wasm' }).end(readFileSync(wasm)),
+    '/room.baked/': baked,
+    '/luxel_rt.wasm': runtime,
+    '/luxel-three/luxel_rt.wasm': runtime,
+    ...routes,
   });
   const browser = await launch();
-  const stage = await openPage(browser, `${server.url}stage.html`);
-  await stage.page.waitForFunction(() => document.body.dataset.ready === 'yes');
+  const stage = await openPage(browser, server.url + name);
+  if (name === 'stage.html') await stage.page.waitForFunction(() => document.body.dataset.ready === 'yes');
   return {
     ...stage,
     url: server.url,
