@@ -295,7 +295,7 @@ test("on a phone the panel opens from below, sliders follow the finger and nothi
     });
   assert.deepEqual(await outside(), [0]);
   const slider = row(page, "left").locator("input[type=range]");
-  assert.ok((await page.locator("#panel").boundingBox()).y > 700, "the sheet is down at first");
+  await page.waitForFunction(() => document.getElementById("panel").getBoundingClientRect().top > 740); // the sheet is down at first
   await page.locator(".grip").tap();
   await page.waitForFunction(() => document.getElementById("panel").getBoundingClientRect().top < 480);
   assert.deepEqual(await outside(), [0]);
