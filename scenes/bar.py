@@ -1466,7 +1466,7 @@ def make_cameras(b):
         ("main", (2.7, 1.5, 2.2), (-1.05, 1.36, -1.9), 48),
         ("window", (-3.0, 1.6, -0.75), (2.3, 1.15, 2.0), 47),
     ):
-        b.node(name, camera=b.g.add_camera(name, fov), at=eye, rotation=look(eye, target))
+        b.node(name, camera=b.g.add_camera(name, fov, aspect=16 / 9), at=eye, rotation=look(eye, target))
 
 
 def build():

@@ -23,6 +23,7 @@ export class Stage {
     this.animated = () => false;
     this.onframe = () => {};
     this.yfov = 50; // of the camera chosen; on narrow screens the picture shows more than that
+    this.frameAspect = 1; // what the camera chosen was framed for
     this.timing = { update: 0, render: 0, interval: 0 };
     this.frame = 0;
     this.last = 0;
@@ -46,6 +47,7 @@ export class Stage {
   setCamera(which, yfov) {
     if (typeof which === "object") {
       this.yfov = yfov ?? this.yfov;
+      this.frameAspect = 1;
       this.#place(new Matrix4().fromArray(which.elements ?? which));
       return true;
     }
@@ -54,11 +56,13 @@ export class Stage {
     if (!camera) {
       if (which !== 0) return false;
       this.yfov = 40;
+      this.frameAspect = 1;
       this.#place(this.#framing());
       return true;
     }
     camera.updateWorldMatrix(true, false);
     this.yfov = camera.fov;
+    this.frameAspect = camera.aspect; // the file's aspectRatio; 1 where it has none
     this.#place(camera.matrixWorld);
     return true;
   }
@@ -147,8 +151,9 @@ export class Stage {
   #project(aspect) {
     const { camera } = this;
     const half = Math.tan(MathUtils.degToRad(this.yfov) / 2);
-    // A phone held upright sees as much from left to right as a square picture would.
-    camera.fov = MathUtils.radToDeg(2 * Math.atan(aspect < 1 ? Math.min(half / aspect, Math.tan(MathUtils.degToRad(50))) : half));
+    // A screen narrower than what the camera was framed for shows all of its width, and more above and below.
+    const narrow = Math.max(1, this.frameAspect / aspect);
+    camera.fov = MathUtils.radToDeg(2 * Math.atan(Math.max(half, Math.min(half * narrow, Math.tan(MathUtils.degToRad(50))))));
     camera.aspect = aspect;
     camera.near = Math.min(0.05, this.radius * 0.01);
     camera.far = Math.max(100, this.radius * 40);
