@@ -4,7 +4,9 @@ import { MathUtils, Matrix4, Vector3 } from "three";
 
 const followPerSecond = 16;
 const pitchLimit = Math.PI / 2 - 0.01;
-const moveKeys = new Set(["KeyW", "KeyA", "KeyS", "KeyD", "KeyQ", "KeyE", "ArrowUp", "ArrowDown", "ArrowLeft", "ArrowRight"]);
+const moveKeys = new Set(["KeyW", "KeyA", "KeyS", "KeyD", "KeyQ", "KeyE"]);
+const turnKeys = new Set(["ArrowUp", "ArrowDown", "ArrowLeft", "ArrowRight"]);
+const turnsPerSecond = 0.2; // by keys
 
 export class Controls {
   /** `stage` gives camera, canvas, invalidate(), radius (of the scene, metres) and distanceAhead(). */
@@ -152,14 +154,15 @@ export class Controls {
   }
 
   #pushed() {
-    return this.keys.size > 0 || this.stick.x !== 0 || this.stick.y !== 0;
+    for (const code of this.keys) if (code !== "ShiftLeft") return true; // which only makes the others faster
+    return this.stick.x !== 0 || this.stick.y !== 0;
   }
 
   #walkBy(dt) {
     if (!this.#pushed()) return;
     const down = (...codes) => (codes.some((code) => this.keys.has(code)) ? 1 : 0);
-    const ahead = down("KeyW", "ArrowUp") - down("KeyS", "ArrowDown") - this.stick.y;
-    const right = down("KeyD", "ArrowRight") - down("KeyA", "ArrowLeft") + this.stick.x;
+    const ahead = down("KeyW") - down("KeyS") - this.stick.y;
+    const right = down("KeyD") - down("KeyA") + this.stick.x;
     const up = down("KeyE") - down("KeyQ");
     const { radius } = this.stage;
     const speed = Math.max(Math.min(2.2, radius), radius / 20) * (this.keys.has("ShiftLeft") ? 3 : 1);
@@ -168,6 +171,11 @@ export class Controls {
     this.goal.pivot.x += (-sin(yaw) * ahead + cos(yaw) * right) * speed * dt;
     this.goal.pivot.z += (-cos(yaw) * ahead - sin(yaw) * right) * speed * dt;
     this.goal.pivot.y += up * speed * dt;
+    // Both ways of turning show what lies on that side: walking looks there, orbiting goes there.
+    const turn = 2 * Math.PI * turnsPerSecond * dt, sign = this.mode === "walk" ? -1 : 1;
+    this.goal.yaw += sign * (down("ArrowRight") - down("ArrowLeft")) * turn;
+    const pitch = this.goal.pitch - sign * (down("ArrowDown") - down("ArrowUp")) * turn;
+    this.goal.pitch = MathUtils.clamp(pitch, -pitchLimit, pitchLimit);
     this.#take();
   }
 
@@ -184,8 +192,9 @@ export class Controls {
     }
     if (event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)) return;
     if (event.code.startsWith("Arrow") && event.target !== this.stage.canvas && event.target !== document.body) return;
-    if (!moveKeys.has(event.code) && event.code !== "ShiftLeft") return;
-    if (moveKeys.has(event.code)) event.preventDefault();
+    const moves = moveKeys.has(event.code) || turnKeys.has(event.code);
+    if (!moves && event.code !== "ShiftLeft") return;
+    if (moves) event.preventDefault();
     this.keys.add(event.code);
     this.stage.invalidate();
   }

@@ -45,7 +45,7 @@ class LayerRow {
     this.animation = el("select", { "aria-label": `Animation of ${name}`, onchange: () => model.setAnimation(layer, this.animation.value) }, ...kinds);
     this.period = el("input.number", {
       type: "number", min: 0.02, max: 3600, step: "any", "aria-label": "Period in seconds",
-      onchange: () => this.period.value > 0 && model.setAnimation(layer, layer.animation, Math.max(0.02, Number(this.period.value))),
+      onchange: () => this.period.value > 0 && model.setAnimation(layer, layer.animation, Math.min(3600, Math.max(0.02, Number(this.period.value)))),
     });
     this.periodBox = el("label.period", {}, "every", this.period, "s");
     this.extra = el("div.row-extra", { id: `${id}-extra`, hidden: true }, this.animation, this.periodBox);

@@ -99,13 +99,14 @@ export class MonitorGroup {
   /** Plays a file: a picture or a video. */
   async show(file) {
     this.#release();
-    this.url = URL.createObjectURL(file);
+    const url = (this.url = URL.createObjectURL(file));
     const name = file.name || "what was dropped";
+    const show = file.type.startsWith("video/") ? this.#playVideo : this.#showPicture;
     try {
-      if (file.type.startsWith("video/")) await this.#playVideo(this.url);
-      else await this.#showPicture(this.url);
+      if (!(await show.call(this, url))) return;
       this.#say(`Shows ${name}`);
     } catch (error) {
+      if (this.url !== url) return;
       this.#release();
       this.#say(`This browser can't show ${name}: ${error.message}`, true);
     }
@@ -113,13 +114,16 @@ export class MonitorGroup {
     this.stage.invalidate();
   }
 
+  // These two show what is behind a URL; false if something else was chosen while it was read.
   async #showPicture(url) {
     const image = new Image();
     image.src = url;
     await image.decode().catch(() => {
       throw new Error("not a picture it knows");
     });
+    if (this.url !== url) return false;
     this.#setImage(image);
+    return true;
   }
 
   #setImage(image) {
@@ -134,6 +138,7 @@ export class MonitorGroup {
       video.onloadeddata = resolve;
       video.onerror = () => reject(new Error(video.error?.message || "not a video it knows"));
     });
+    if (this.url !== url) return false;
     this.video = video;
     this.#own(true);
     this.monitor.setVideo(video);
@@ -145,6 +150,7 @@ export class MonitorGroup {
       else setTimeout(follow, 33);
     };
     follow();
+    return this.url === url;
   }
 
   #pause() {

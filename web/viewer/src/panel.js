@@ -143,7 +143,7 @@ export class Panel {
       [gpu ? "if summed by the CPU" : "if summed by the GPU", bytes(gpu ? budget.gpuComposed : budget.gpuLayers)],
     ];
     const keys = [
-      ["W A S D", "move (Q, E: down, up; Shift: faster)"], ["Drag", "orbit, or look when walking"], ["Right drag, two fingers", "shift"],
+      ["W A S D", "move (Q, E: down, up; Shift: faster)"], ["Arrows", "turn"], ["Drag", "orbit, or look when walking"], ["Right drag, two fingers", "shift"],
       ["Wheel, pinch", "nearer, farther"], ["Double click", "orbit around that point"], ["C", "next camera"], ["G", "orbit or walk"], ["V", "next view"], ["T", "tone mapping"],
       ["+ −", "exposure"], ["P", "panel"],
     ];

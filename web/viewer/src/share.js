@@ -41,13 +41,13 @@ export function readState(text, stage, model) {
     const [hex, intensity, flags, animation, period] = parts.slice(-5);
     const name = parts.slice(0, -5).join("~"); // names may hold anything
     const layer = model.layers.find(({ light }) => light.name === name);
-    if (!layer || !/^[0-9a-f]{6}$/i.test(hex) || !(Number(intensity) >= 0)) continue;
+    if (!layer || !/^[0-9a-f]{6}$/i.test(hex) || !(Number(intensity) >= 0 && Number(intensity) < 1e9)) continue;
     // A colour that was not changed keeps the digits that six hexadecimal ones can't hold.
     if (hexOf(layer.color).slice(1) !== hex) model.setColor(layer, new Color(`#${hex}`));
     if (round(layer.intensity) !== Number(intensity)) model.setIntensity(layer, Number(intensity));
     if (flags.includes("m")) model.setMuted([layer], true);
     if (flags.includes("s")) model.setSolo([layer], true);
     const kinds = ["none", "blink", "flicker", "pulse", "wheel"];
-    if (kinds.includes(animation) && animation !== layer.animation) model.setAnimation(layer, animation, Number(period) > 0 ? Number(period) : undefined);
+    if (kinds.includes(animation) && animation !== layer.animation) model.setAnimation(layer, animation, Number(period) > 0 ? Math.min(3600, Math.max(0.02, Number(period))) : undefined);
   }
 }

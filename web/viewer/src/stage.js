@@ -82,9 +82,11 @@ export class Stage {
     const camera = new PerspectiveCamera(40, 1, distance * 0.01, distance * 4);
     const pixels = new Uint8Array(64 * 64 * 4);
     const { background } = this.room.scene;
+    const dome = this.room.scene.getObjectByName("luxel sky"); // is behind all of them
     const clear = this.renderer.getClearAlpha();
     let best = null, most = -1;
     this.room.scene.background = null;
+    if (dome) dome.visible = false;
     this.renderer.setClearAlpha(0);
     this.renderer.setRenderTarget(target);
     for (let k = 0; k < 8; k++) {
@@ -105,6 +107,7 @@ export class Stage {
     this.renderer.setRenderTarget(null);
     this.renderer.setClearAlpha(clear);
     this.room.scene.background = background;
+    if (dome) dome.visible = true;
     target.dispose();
     return best;
   }
@@ -224,11 +227,13 @@ export class Stage {
   autoExposure() {
     const width = 160, height = 90;
     const target = new WebGLRenderTarget(width, height, { type: HalfFloatType });
-    const { renderer } = this;
+    const { renderer, view } = this;
+    if (view !== "lit") this.room.setView("lit"); // the others are not radiance
     this.#develop();
     renderer.setRenderTarget(target);
     renderer.render(this.room.scene, this.camera);
     renderer.setRenderTarget(null);
+    if (view !== "lit") this.room.setView(view);
     const halves = new Uint16Array(width * height * 4);
     renderer.readRenderTargetPixels(target, 0, 0, width, height, halves);
     target.dispose();
