@@ -45,18 +45,18 @@ const SCRATCH_BYTES = 1024; // larger than any of them, and than two
 
 const modules = new Map(); // URL -> Promise<WebAssembly.Module>: compiled once for all rooms of a page
 
-async function compile(url, signal) {
-  const response = await fetch(url, { signal });
+async function compile(url) {
+  const response = await fetch(url);
   if (!response.ok) throw new Error(`luxel: ${url}: ${response.status} ${response.statusText}`);
   return WebAssembly.compile(await response.arrayBuffer());
 }
 
-function compiled(url, signal) {
+function compiled(url) {
   let module = modules.get(url);
   if (!module) {
-    module = compile(url, signal);
+    module = compile(url); // nobody's to abort: others may wait for it
     modules.set(url, module);
-    module.catch(() => modules.delete(url)); // a failure, e.g. an abort, is not for keeps
+    module.catch(() => modules.delete(url)); // a failure is not for keeps
   }
   return module;
 }
@@ -69,7 +69,7 @@ export class Runtime {
   #scratch;
   #text = new Map(); // strings of ours in the module's memory
   #pixels = { at: 0, bytes: 0 };
-  #keys = new Map(); // layer -> memory for its program's keys
+  #keys = new Map(); // layer -> memory for its program's keys, and for those of the next program
   #reader = new TextDecoder();
 
   /** The bytes of luxel_rt.wasm or a compiled module. */
@@ -84,7 +84,9 @@ export class Runtime {
   }
 
   static async load(wasmUrl, signal) {
-    return Runtime.instantiate(await compiled(String(wasmUrl), signal));
+    const module = await compiled(String(wasmUrl));
+    signal?.throwIfAborted();
+    return Runtime.instantiate(module);
   }
 
   /** `bytes` of memory for as long as the runtime lives, aligned to 64. */
@@ -129,16 +131,30 @@ export class Runtime {
     }
     const at = this.allocate(room);
     const reader = response.body.getReader();
+    const rest = []; // other sites hide their content-encoding: what they said is the compressed size then
+    let stored = 0;
     let size = 0;
     for (;;) {
       const { done, value } = await reader.read();
       if (done) break;
-      if (size + value.length > room) throw new Error(`luxel: ${response.url} is longer than it said`);
-      this.bytes(at + size, value.length).set(value);
+      if (rest.length > 0 || size + value.length > room) {
+        rest.push(value);
+      } else {
+        this.bytes(at + size, value.length).set(value);
+        stored += value.length;
+      }
       size += value.length;
       onBytes?.(size);
     }
-    return { at, size };
+    if (rest.length === 0) return { at, size };
+    if (this.#used === at + room) this.#used = at; // nothing came behind: the place grows
+    const whole = this.allocate(size);
+    this.bytes(0, this.memoryBytes).copyWithin(whole, at, at + stored);
+    for (const part of rest) {
+      this.bytes(whole + stored, part.length).set(part);
+      stored += part.length;
+    }
+    return { at: whole, size };
   }
 
   open({ at, size }) {
@@ -152,7 +168,7 @@ export class Runtime {
   }
 
   #check(result, what) {
-    if (result !== 0) throw new Error(`luxel: ${what}: ${this.#string(this.#exports.lxrt_result_name(result))}`);
+    if (result !== 0) throw new Error(`luxel: ${what}: ${this.#string(this.#exports.lxrt_result_name(result) >>> 0)}`);
   }
 
   #string(at) {
@@ -285,7 +301,7 @@ export class Runtime {
   }
 
   createAccumulator(page) {
-    const bytes = this.#exports.lxrt_accumulator_bytes(this.pack);
+    const bytes = this.#exports.lxrt_accumulator_bytes(this.pack) >>> 0;
     const memory = this.allocate(bytes);
     this.#check(this.#exports.lxrt_accumulator_create(this.pack, page, memory, bytes, this.#scratch), `page ${page}`);
     return this.words(this.#scratch, 1)[0];
@@ -335,19 +351,17 @@ export class Runtime {
     const keyFloats = interpolation === 2 && kind === 1 ? 10 : 4;
     if (keys.length % keyFloats !== 0) throw new Error(`luxel: ${keys.length} numbers are no keys of ${keyFloats}`);
     if (keys.length > 0) {
-      // The runtime borrows keys: they stay, and a layer's next program takes their place if it fits.
-      let memory = this.#keys.get(layer);
-      this.#check(this.#exports.lxrt_set_program(this.pack, layer, 0), `layer ${layer}`);
-      if (!memory || memory.bytes < 4 * keys.length) {
-        memory = { at: this.allocate(4 * keys.length), bytes: 4 * keys.length };
-        this.#keys.set(layer, memory);
-      }
-      this.floats(memory.at, keys.length).set(keys);
-      values.keys = memory.at;
+      // The runtime borrows keys: those of a layer's program stay while the next one's, which it may refuse, lie beside them.
+      let [used, spare] = this.#keys.get(layer) ?? [];
+      if (!spare || spare.bytes < 4 * keys.length) spare = { at: this.allocate(4 * keys.length), bytes: 4 * keys.length };
+      this.#keys.set(layer, [used, spare]);
+      this.floats(spare.at, keys.length).set(keys);
+      values.keys = spare.at;
       values.keyCount = keys.length / keyFloats;
     }
     this.#write('program', this.#scratch, values);
     this.#check(this.#exports.lxrt_set_program(this.pack, layer, this.#scratch), `program of layer ${layer}`);
+    if (keys.length > 0) this.#keys.get(layer).reverse();
   }
 
   resetDriver(layer) {
