@@ -5,6 +5,7 @@ import { FORMAT } from './runtime.js';
 
 const FACTORS_PER_ROW = 256; // as in shaders/lxrt_compose.glsl
 const LARGEST = 65408; // of RGB9E5
+const LARGEST_EXPONENT = 100; // of the scale, which the runtime and shaders take as a float
 
 // three.js cannot update a part of a level of a slice, so the texture is ours and three only binds it.
 class ArrayTexture {
@@ -33,7 +34,9 @@ class ArrayTexture {
 
   // three remembers what is bound and how pixels are unpacked: both are set through it.
   #bind(gl) {
-    this.#renderer.state.bindTexture(gl.TEXTURE_2D_ARRAY, this.texture.sourceTexture, gl.TEXTURE0);
+    const { state } = this.#renderer;
+    state.activeTexture(gl.TEXTURE0); // uploads go to the active unit, and bindTexture() leaves that alone when it remembers our texture
+    state.bindTexture(gl.TEXTURE_2D_ARRAY, this.texture.sourceTexture, gl.TEXTURE0);
   }
 
   /** A rectangle of a level; `words` begins at its first texel and has `rowLength` texels from row to row. */
@@ -81,8 +84,11 @@ export class ComposedPages {
   // to be composed again.
   #chooseScale(brightest) {
     const stored = brightest * this.#scale;
-    if (stored <= LARGEST && (stored >= 16 || brightest === 0)) return;
-    this.#scale = 2 ** (12 - Math.ceil(Math.log2(brightest)));
+    if (!(brightest > 0) || (stored <= LARGEST && stored >= 16)) return;
+    const exponent = 12 - Math.ceil(Math.log2(brightest));
+    const scale = 2 ** Math.min(Math.max(exponent, -LARGEST_EXPONENT), LARGEST_EXPONENT);
+    if (scale === this.#scale) return; // darker than that, texels are black
+    this.#scale = scale;
     this.reset();
   }
 

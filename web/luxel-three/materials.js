@@ -79,26 +79,18 @@ vec3 luxelIrradiance() {
 }
 
 // Real-time lights as KHR_lights_punctual wants them. Our functions take the place of three's.
-const lightsPars = (() => {
-  const replaced = ShaderChunk.lights_pars_begin
-    .replace(
-      /float getDistanceAttenuation\([^]*?\n}\n/,
-      `${lx_range_factor}
+function lightsPars() {
+  const ranged = replaceFunction(ShaderChunk.lights_pars_begin, 'getDistanceAttenuation', `${lx_range_factor}
 float getDistanceAttenuation(const in float lightDistance, const in float cutoffDistance, const in float decayExponent) {
   return lx_range_factor(lightDistance, cutoffDistance) / max(pow(lightDistance, decayExponent), 1e-6);
 }
-`,
-    )
-    .replace(
-      /float getSpotAttenuation\([^]*?\n}\n/,
-      `${lx_spot_factor}
+`);
+  return replaceFunction(ranged, 'getSpotAttenuation', `${lx_spot_factor}
 float getSpotAttenuation(const in float coneCosine, const in float penumbraCosine, const in float angleCosine) {
   return lx_spot_factor(penumbraCosine, coneCosine, angleCosine);
 }
-`,
-    );
-  return replaced;
-})();
+`);
+}
 
 // The lightmap is all the diffuse light that is not real-time: in place of ambient light, probes and the environment. Reflections of
 // the environment stay, also those that bounced between facets, which three's function adds together with its diffuse light.
@@ -163,6 +155,12 @@ function insert(source, where, text, before = false) {
 }
 function replace(source, where, text) {
   return insert(source, where, '', false).replace(where, () => text);
+}
+
+function replaceFunction(source, name, text) {
+  const definition = new RegExp(`float ${name}\\([^]*?\\n}\\n`);
+  if (!definition.test(source)) throw new Error(`luxel: the shaders of three.js r${REVISION} have no function ${name}`);
+  return source.replace(definition, () => text);
 }
 
 /** Makes and keeps a room's materials. */
@@ -241,7 +239,7 @@ export class Materials {
     let pars = 'uniform int luxelView;\nuniform float luxelExposure;\n';
     if (standard) {
       pars += 'uniform vec3 luxelSky;\n';
-      fragment = replace(fragment, '#include <lights_pars_begin>', lightsPars);
+      fragment = replace(fragment, '#include <lights_pars_begin>', lightsPars());
       fragment = insert(fragment, '#include <lights_fragment_maps>', lit ? skyTint + skyOcclusion : skyTint);
     }
     if (lit) {
