@@ -55,9 +55,9 @@ export interface Monitor {
   readonly firstLayer: number;
   /** The meshes that show the picture. */
   readonly meshes: readonly Mesh[];
-  /** Radiance (nit) of a white pixel. */
+  /** Radiance (nit) of a white pixel, in the authored picture too. */
   strength: Color;
-  /** Share of the old colour that an update keeps, 0…1. */
+  /** Share of the old colour that the next frame of a video or of a live canvas keeps, [0, 1). Stills and pixels are there at once. */
   smoothing: number;
   /** Plays a video: its frames light the room. `null` brings back the authored picture. */
   setVideo(video: HTMLVideoElement | null): void;
@@ -113,7 +113,7 @@ export interface Room {
   /** Sets a layer by name or index. `color` as three takes it; intensity in the layer's unit, default: as it is. What drove the layer (its
    *  program, an animation of the file, a bound light) does so no more, until {@link Room.resetLight}. */
   setLight(layer: string | number, color: ColorRepresentation, intensity?: number): void;
-  /** Back to the authored colour, and to the animations of the file. */
+  /** Back to the authored colour (a monitor's cell: at the monitor's strength of now), and to the animations of the file. */
   resetLight(layer: string | number): void;
   /** Lets a three.js light drive a layer: its colour × intensity is read every frame, whatever animates it. Returns a function that ends it. */
   bind(light: Light, layer: string | number): () => void;
@@ -121,9 +121,11 @@ export interface Room {
   setProgram(layer: string | number, program: Program | null): void;
   /** Starts the animations of the file: layers' colours and moving nodes. Without a name: all. */
   play(name?: string): void;
+  /** Stops them: colours and nodes stay as they are, until {@link Room.play} takes them to the time there is then. */
   stop(name?: string): void;
 
-  /** Once a frame, before rendering: drivers, monitors, lightmap. `time` in seconds; default: since load. Returns true if a lightmap changed. */
+  /** Once a frame, before rendering: drivers, monitors, lightmap. `time` in seconds; default: since load. Returns true if a lightmap changed.
+   *  Throws if a field of a light or monitor was set to what cannot be summed; the field is as before then. */
   update(time?: number): boolean;
 
   /** Composed irradiance of a page, RGB floats (for tests and tools). */

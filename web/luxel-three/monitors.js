@@ -17,13 +17,13 @@ export class Monitor {
   #record;
   #screens;
   #siblings; // monitors that share our layers, we among them
-  #touched; // called with first layer and count when cells were set
+  #touched; // called when cells were set, or are to be as authored
   #strength;
   #smoothing = 0;
   #source = null; // { picture, texture, live, frame }
   #cells = null; // texture of the cells' own colours
   #canvas = null;
-  #configured; // strength that the runtime knows
+  #configured; // strength that the runtime knows, and that the cells were made with
 
   constructor(runtime, index, record, meshes, screens, touched) {
     this.#runtime = runtime;
@@ -74,6 +74,7 @@ export class Monitor {
   setVideo(video) {
     this.#release();
     if (!video) {
+      this.#applyStrength();
       this.#touched(this, 'authored');
       return;
     }
@@ -106,21 +107,28 @@ export class Monitor {
       throw new Error(`luxel: monitor "${this.name}": ${pixels.length} bytes are no picture of ${width} x ${height}`);
     this.#release();
     this.#applyStrength();
-    this.#runtime.monitorUpdate(this.index, pixels, width, height, PIXELS.rgba8);
+    this.#setCells(pixels, width, height, 0);
     this.#touched(this, 'cells');
   }
 
-  /** Once a frame. */
+  /** How much stronger than authored the screen is, by channel. What is authored dark has no picture that could become brighter. */
+  get gain() {
+    return this.#record.strength.map((authored, i) => (authored > 0 ? this.#configured[i] / authored : 1));
+  }
+
+  /** Once a frame. Returns whether the strength changed of what is no picture of ours. */
   update() {
     const source = this.#source;
     const moved = this.#applyStrength();
-    if (!source) return;
+    if (!source) return moved;
     if (source.byTime && source.picture.currentTime !== source.seen) source.fresh = source.picture.readyState >= 2;
     if (!source.picture.requestVideoFrameCallback && source.live && !source.byTime) {
       source.fresh = true;
       source.texture.needsUpdate = true;
     }
-    if (source.fresh || moved) this.#fetch();
+    // A paused video has no next frame that would bring its cells the rest of the way.
+    if (source.fresh || moved || (source.settling && source.picture.paused)) this.#fetch();
+    return false;
   }
 
   /** What the screen shows: its picture at `share` of its brightness, or the cells' colours where no picture set them. */
@@ -142,7 +150,7 @@ export class Monitor {
       for (const screen of screens) screen.show(this.#cells, 1, 1, 1);
       return;
     }
-    const { r, g, b } = this.#strength;
+    const [r, g, b] = this.#source ? this.#configured : this.gain.map((gain, i) => gain * this.#record.strength[i]);
     for (const screen of screens) screen.show(this.#source ? this.#source.texture : undefined, r, g, b);
   }
 
@@ -169,9 +177,24 @@ export class Monitor {
   #applyStrength() {
     const { r, g, b } = this.#strength;
     if (r === this.#configured[0] && g === this.#configured[1] && b === this.#configured[2]) return false;
+    try {
+      this.#runtime.monitorConfigure(this.index, [r, g, b], this.#smoothing);
+    } catch (cause) {
+      this.#strength.setRGB(...this.#configured);
+      throw new Error(`luxel: monitor "${this.name}": a strength of ${r}, ${g}, ${b} is negative, not finite or too large`, { cause });
+    }
     this.#configured = [r, g, b];
-    this.#runtime.monitorConfigure(this.index, this.#configured, this.#smoothing);
     return true;
+  }
+
+  #setCells(pixels, width, height, smoothing) {
+    this.#runtime.monitorConfigure(this.index, this.#configured, smoothing);
+    this.#runtime.monitorUpdate(this.index, pixels, width, height, PIXELS.rgba8);
+    this.#runtime.monitorConfigure(this.index, this.#configured, this.#smoothing);
+  }
+
+  #colors() {
+    return Array.from({ length: this.layerCount }, (_, k) => this.#runtime.color(this.firstLayer + k, [0, 0, 0])).flat();
   }
 
   #fetch() {
@@ -191,15 +214,21 @@ export class Monitor {
       this.#canvas = canvas.getContext('2d', { willReadFrequently: true, alpha: false });
       this.#canvas.imageSmoothingQuality = 'medium';
     }
-    this.#canvas.drawImage(source.picture, 0, 0, across, down);
     let pixels;
     try {
+      this.#canvas.drawImage(source.picture, 0, 0, across, down);
       pixels = this.#canvas.getImageData(0, 0, across, down).data;
     } catch (cause) {
-      this.#release();
-      throw new Error(`luxel: monitor "${this.name}": the picture comes from elsewhere and may not be read (CORS)`, { cause });
+      this.#canvas = null; // what it has drawn keeps it from being read ever again
+      this.setVideo(null);
+      const why = cause.name === 'SecurityError' ? 'comes from elsewhere and may not be read (CORS)' : 'cannot be drawn';
+      throw new Error(`luxel: monitor "${this.name}": the picture ${why}`, { cause });
     }
-    this.#runtime.monitorUpdate(this.index, pixels, across, down, PIXELS.rgba8);
+    // A still picture is there at once: no next frame would bring the rest.
+    const smoothing = source.live ? this.#smoothing : 0;
+    const before = smoothing > 0 ? this.#colors() : [];
+    this.#setCells(pixels, across, down, smoothing);
+    source.settling = smoothing > 0 && this.#colors().some((value, i) => value !== before[i]);
     this.#touched(this, 'picture');
   }
 

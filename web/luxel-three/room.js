@@ -10,11 +10,16 @@ const PROGRAM_KINDS = ['constant', 'keys', 'blink', 'flicker', 'pulse', 'wheel',
 const UNITS = { point: 'cd', spot: 'cd', directional: 'lx' };
 
 function chooseMethod({ method = 'auto', gpuMemoryLimit }, runtime, renderer) {
-  const { layerCount, pageCount } = runtime.info;
+  const { layerCount, pageCount, pageSize } = runtime.info;
   const gl = renderer.getContext();
   const slicesLimit = gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS);
   const methodReason = { composeMs: measureCompose(runtime), layers: layerCount, gpuLayersBytes: runtime.budget().gpuLayers };
+  const sizeLimit = gl.getParameter(gl.MAX_TEXTURE_SIZE);
   if (!['auto', 'cpu', 'gpu'].includes(method)) throw new Error(`luxel: "${method}" is no method`);
+  if (pageSize > sizeLimit)
+    throw new Error(`luxel: pages of ${pageSize} x ${pageSize} texels are more than the ${sizeLimit} x ${sizeLimit} this GPU takes: bake with a smaller --page-size`);
+  if (pageCount > slicesLimit)
+    throw new Error(`luxel: ${pageCount} pages are more than the ${slicesLimit} this GPU takes: bake with a larger --page-size or fewer --max-pages`);
   if (method === 'gpu' && layerCount * pageCount > slicesLimit)
     throw new Error(`luxel: method gpu: ${layerCount} layers of ${pageCount} pages are more than the ${slicesLimit} slices this GPU takes`);
   if (method === 'auto') method = autoMethod({ ...methodReason, slices: layerCount * pageCount, slicesLimit, gpuMemoryLimit });
@@ -89,6 +94,7 @@ export class Room {
   #gltf;
   #mixer = null;
   #actions = new Map(); // name -> actions of moving nodes
+  #stopped = new Map(); // action -> time of its clip where it was stopped
   #emitters = []; // { material, layer, weight }
   #realtime = []; // { light, layer, weight }: mixed lights
   #skySource = null;
@@ -96,11 +102,11 @@ export class Room {
   #logical; // c of each layer, whether it is muted or not
   #inPack; // c that the runtime has now
   #fields; // color and intensity of each LayerLight as we last knew them
-  #screenModes = new Map(); // first layer of monitors -> 'authored', 'cells', 'picture'
+  #screens = new Map(); // first layer of monitors -> { mode: 'authored', 'cells' or 'picture', monitor that was touched last }
+  #ownCells = new Set(); // layers of monitors that do not shine as authored
   #started = performance.now();
   #owned = { geometries: new Set(), materials: new Set(), textures: new Set(), objects: new Set() };
   #dirty = true; // c changed since emitters, sky and lights were last set
-  #read = null; // called with layers that monitors set
   #disposed = false;
 
   constructor(renderer, runtime, gltf, sky, manifest, options) {
@@ -146,6 +152,7 @@ export class Room {
     const { geometries, materials, textures, objects } = this.#owned;
     this.#gltf.scene.traverse((object) => {
       if (object.isInstancedMesh || object.isLight) objects.add(object);
+      if (object.isSkinnedMesh) objects.add(object.skeleton); // its bones are a texture
       if (object.geometry) geometries.add(object.geometry);
       for (const material of [object.material ?? []].flat()) materials.add(material);
     });
@@ -255,18 +262,35 @@ export class Room {
     for (const monitor of monitors) {
       monitor.shareWith(monitors.filter((other) => other.firstLayer === monitor.firstLayer));
       for (let k = 0; k < monitor.layerCount; k++) this.lights[monitor.firstLayer + k].monitor ??= monitor;
-      this.#screenModes.set(monitor.firstLayer, 'authored');
+      if (!this.#screens.has(monitor.firstLayer)) this.#screens.set(monitor.firstLayer, { mode: 'authored', monitor });
     }
     return monitors;
   }
 
+  #cellsOf({ firstLayer, layerCount }) {
+    return this.lights.slice(firstLayer, firstLayer + layerCount);
+  }
+
   #monitorTouched(monitor, mode) {
-    this.#screenModes.set(monitor.firstLayer, mode);
-    const rgb = [0, 0, 0];
-    for (let layer = monitor.firstLayer; layer < monitor.firstLayer + monitor.layerCount; layer++) {
-      if (mode === 'authored') this.#runtime.resetDriver(layer);
-      this.#adopt(this.lights[layer], this.#runtime.color(layer, rgb), true);
+    this.#screens.set(monitor.firstLayer, { mode, monitor });
+    for (const light of this.#cellsOf(monitor)) {
+      if (mode === 'authored') {
+        this.#ownCells.delete(light.index);
+        this.#setAuthored(light);
+      } else {
+        this.#ownCells.add(light.index);
+        this.#adopt(light, this.#runtime.color(light.index, [0, 0, 0]), true);
+      }
     }
+  }
+
+  // Something of a layer's own gives it its colour: a screen that has such cells shows them.
+  #ownColor(light) {
+    if (!light.monitor) return;
+    this.#ownCells.add(light.index);
+    const screen = this.#screens.get(light.monitor.firstLayer);
+    if (screen.mode === 'authored') screen.mode = 'cells';
+    this.#dirty = true;
   }
 
   #findAnimations() {
@@ -346,16 +370,34 @@ export class Room {
     }
   }
 
+  // The fields become the layer's colour; what cannot be summed leaves all as it was, the fields too.
   #takeOver(light) {
     const { index, color, intensity } = light;
+    const { r, g, b } = color;
+    try {
+      this.#runtime.setColor(index, r, g, b, intensity);
+    } catch (cause) {
+      const known = this.#fields.subarray(4 * index, 4 * index + 4);
+      color.setRGB(known[0], known[1], known[2]);
+      light.intensity = known[3];
+      throw new Error(`luxel: layer "${light.name}": a colour of ${r}, ${g}, ${b} at ${intensity} ${light.unit} is not finite or too large`, { cause });
+    }
     this.#runtime.setProgram(index, null);
-    this.#runtime.setColor(index, color.r, color.g, color.b, intensity); // throws if it cannot be summed
     this.#runtime.color(index, this.#inPack.subarray(3 * index, 3 * index + 3));
     this.#logical.set(this.#inPack.subarray(3 * index, 3 * index + 3), 3 * index);
     this.#noteFields(light);
     this.#dirty = true;
-    if (light.monitor && this.#screenModes.get(light.monitor.firstLayer) === 'authored')
-      this.#screenModes.set(light.monitor.firstLayer, 'cells');
+    this.#ownColor(light);
+  }
+
+  #setAuthored(light) {
+    this.#runtime.resetDriver(light.index);
+    light.color.copy(light.authored.color);
+    light.intensity = light.authored.intensity;
+    const { r, g, b } = light.color;
+    const gain = light.monitor ? this.#screens.get(light.monitor.firstLayer).monitor.gain : [1, 1, 1];
+    this.#runtime.setColor(light.index, r * gain[0], g * gain[1], b * gain[2], light.intensity);
+    this.#adopt(light, this.#runtime.color(light.index, [0, 0, 0]), gain.some((value) => value !== 1));
   }
 
   #isSilent(light, anySolo) {
@@ -389,18 +431,19 @@ export class Room {
   resetLight(layer) {
     const light = this.lights[this.#index(layer)];
     this.#bindings.delete(light.index);
-    this.#runtime.resetDriver(light.index);
-    light.color.copy(light.authored.color);
-    light.intensity = light.authored.intensity;
-    const { r, g, b } = light.color;
-    this.#runtime.setColor(light.index, r, g, b, light.intensity);
-    this.#adopt(light, this.#runtime.color(light.index, [0, 0, 0]), false);
+    this.#setAuthored(light);
+    if (!light.monitor) return;
+    this.#ownCells.delete(light.index);
+    const { mode, monitor } = this.#screens.get(light.monitor.firstLayer);
+    if (mode === 'cells' && !this.#cellsOf(monitor).some(({ index }) => this.#ownCells.has(index))) this.#monitorTouched(monitor, 'authored');
   }
 
   bind(object, layer) {
     const index = this.#index(layer);
+    if (!object?.isLight) throw new Error(`luxel: what is bound to layer "${this.lights[index].name}" is no light`);
     this.#runtime.setProgram(index, null);
     this.#bindings.set(index, object);
+    this.#ownColor(this.lights[index]);
     return () => {
       if (this.#bindings.get(index) === object) this.#bindings.delete(index);
     };
@@ -408,13 +451,14 @@ export class Room {
 
   setProgram(layer, program) {
     const index = this.#index(layer);
-    this.#bindings.delete(index);
     if (program === null) {
       this.#runtime.setProgram(index, null);
-      return;
+    } else {
+      const { r, g, b } = new Color(program.color ?? 0xffffff);
+      this.#runtime.setProgram(index, { ...program, color: [r, g, b] });
+      this.#ownColor(this.lights[index]);
     }
-    const { r, g, b } = new Color(program.color ?? 0xffffff);
-    this.#runtime.setProgram(index, { ...program, color: [r, g, b] });
+    this.#bindings.delete(index);
   }
 
   play(name) {
@@ -429,7 +473,19 @@ export class Room {
     if (chosen.length === 0 && name !== undefined) throw new Error(`luxel: no animation "${name}"`);
     if (chosen.some(({ layer }) => layer >= 0)) this.#runtime.play(name, playing);
     for (const [clip, actions] of this.#actions)
-      if (name === undefined || clip === name) for (const action of actions) action.paused = !playing;
+      if (name === undefined || clip === name)
+        for (const action of actions) {
+          if (playing) this.#stopped.delete(action);
+          else if (!action.paused) this.#stopped.set(action, action.time);
+          action.paused = !playing;
+        }
+  }
+
+  // AnimationMixer.setTime(), but that what was stopped stays where it was and not where its clip begins.
+  #move(time) {
+    this.#mixer.time = 0;
+    for (const actions of this.#actions.values()) for (const action of actions) action.time = this.#stopped.get(action) ?? 0;
+    this.#mixer.update(time);
   }
 
   // ---- once a frame
@@ -448,7 +504,8 @@ export class Room {
       light.intensity = intensity;
       this.#takeFields();
     }
-    for (const monitor of this.monitors) monitor.update();
+    for (const monitor of this.monitors)
+      if (monitor.update() && this.#screens.get(monitor.firstLayer).mode === 'authored') this.#monitorTouched(monitor, 'authored');
     if (this.#runtime.update(time) > 0) {
       const rgb = [0, 0, 0];
       for (const light of this.lights) {
@@ -458,7 +515,7 @@ export class Room {
       }
     }
     this.#silence();
-    this.#mixer?.setTime(time);
+    if (this.#mixer) this.#move(time);
 
     this.#uniforms.luxelExposure.value = this.#renderer.toneMappingExposure;
     const changed = this.#lightmap.update(this.#brightest());
@@ -467,11 +524,11 @@ export class Room {
     return changed;
   }
 
-  // A bound on E: a layer's brightest texel is stored as 2^14…2^15.
+  // A bound on E: a layer's brightest texel is stored as 2^14…2^15. Layers that take light away do not lower it: they are dark elsewhere.
   #brightest() {
     let sum = 0;
     for (const { index, scale } of this.lights)
-      sum += Math.max(this.#inPack[3 * index], this.#inPack[3 * index + 1], this.#inPack[3 * index + 2]) * scale * 32768;
+      sum += Math.max(0, this.#inPack[3 * index], this.#inPack[3 * index + 1], this.#inPack[3 * index + 2]) * scale * 32768;
     return sum;
   }
 
@@ -487,11 +544,12 @@ export class Room {
     if (this.#sky && this.#skySource) this.#sky.setColor(this.scene, radiance(this.#skySource.layer, this.#skySource.weight), this.#uniforms);
     const anySolo = this.lights.some(({ solo }) => solo);
     for (const monitor of this.monitors) {
-      const cells = this.lights.slice(monitor.firstLayer, monitor.firstLayer + monitor.layerCount);
-      if (cells.every((light) => this.#isSilent(light, anySolo))) {
+      const screen = this.#screens.get(monitor.firstLayer);
+      const pictured = this.monitors.find((other) => other.firstLayer === monitor.firstLayer && other.showsPicture);
+      if (this.#cellsOf(monitor).every((light) => this.#isSilent(light, anySolo))) {
         monitor.darken();
-      } else if (monitor.showsPicture || !this.monitors.some((other) => other.firstLayer === monitor.firstLayer && other.showsPicture)) {
-        monitor.display(this.#screenModes.get(monitor.firstLayer), (layer, rgb) => {
+      } else if (monitor === (pictured ?? screen.monitor)) {
+        monitor.display(screen.mode, (layer, rgb) => {
           for (let i = 0; i < 3; i++) rgb[i] = this.#inPack[3 * layer + i];
         });
       }
@@ -507,11 +565,13 @@ export class Room {
   readLayer(page, layer, level = 0) {
     const index = this.#index(layer);
     this.#takeFields();
-    for (const light of this.lights) this.#runtime.setColor(light.index, 0, 0, 0);
-    this.#runtime.setColor(index, ...this.#logical.subarray(3 * index, 3 * index + 3));
-    const texels = this.#runtime.readPage(page, level);
-    for (const light of this.lights) this.#runtime.setColor(light.index, ...this.#inPack.subarray(3 * light.index, 3 * light.index + 3));
-    return texels;
+    try {
+      for (const light of this.lights) this.#runtime.setColor(light.index, 0, 0, 0);
+      this.#runtime.setColor(index, ...this.#logical.subarray(3 * index, 3 * index + 3));
+      return this.#runtime.readPage(page, level);
+    } finally {
+      for (const light of this.lights) this.#runtime.setColor(light.index, ...this.#inPack.subarray(3 * light.index, 3 * light.index + 3));
+    }
   }
 
   setView(view) {

@@ -1,6 +1,9 @@
 // luxel-three in Chromium, on the stage that scene.py builds: what one sees when layers change.
 import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
 import { after, before, test } from 'node:test';
+import { Runtime } from '../luxel-three/runtime.js';
+import { serve } from './server.mjs';
 import { needsBaked, openStage } from './setting.mjs';
 
 // Where things are in the picture of the scene's camera: [left, top, right, bottom] in fractions.
@@ -31,6 +34,16 @@ before(async () => {
     Object.assign(window, {
       places,
       room: stage.room,
+      strengths: stage.room.monitors.map(({ strength }) => strength.clone()),
+      /** What a call throws; empty if nothing. */
+      why: (call) => {
+        try {
+          call();
+          return '';
+        } catch (error) {
+          return error.message;
+        }
+      },
       /** Means of places, as the scene looks now. */
       look: (time) => {
         const pixels = stage.draw(time);
@@ -47,7 +60,10 @@ before(async () => {
       reset: () => {
         const room = window.room;
         room.setView('lit');
-        for (const monitor of room.monitors) monitor.setVideo(null);
+        for (const [i, monitor] of room.monitors.entries()) {
+          monitor.strength.copy(window.strengths[i]);
+          monitor.setVideo(null);
+        }
         for (const light of room.lights) {
           light.muted = light.solo = false;
           room.resetLight(light.index);
@@ -468,6 +484,313 @@ test('very bright and very dark light is neither cut off nor lost', needsBaked, 
   for (const value of ratios) assert.ok(Math.abs(value - ratios[1]) < 1.5, `${ratios}`); // 1/512 of each texel
 });
 
+test('light that fades to nothing, or is taken away, is summed like any other', needsBaked, async () => {
+  const { errors, rests } = await inPage(() => {
+    const { room, why } = window;
+    window.only({});
+    const errors = [1e-30, 1e-36, 1e-40, -1, 0].map((intensity) => why(() => (room.setLight('left lamp', 'white', intensity), room.update(0))));
+    room.setLight('right lamp', 'white', 1);
+    room.setLight('left lamp', 'white', -1);
+    errors.push(why(() => room.update(0)));
+    room.setLight('right lamp', 'white', 0);
+    room.setLight('left lamp', 'white', 1e-37);
+    room.update(0);
+    const rests = !room.update(0);
+    window.reset();
+    return { errors, rests };
+  });
+  assert.deepEqual(errors, ['', '', '', '', '', '']);
+  assert.ok(rests, 'a scale that cannot grow composes everything every frame');
+});
+
+test('bright light is not cut off because other light is taken away', needsBaked, async () => {
+  const { brightest, scale } = await inPage(() => {
+    const { room } = window;
+    window.only({ 'left lamp': ['white', 1000], 'right lamp': ['white', -999] });
+    room.update(0);
+    const { vertexShader, fragmentShader } = window.stage.THREE.ShaderLib.physical;
+    const shader = { uniforms: {}, vertexShader, fragmentShader };
+    room.scene.getObjectByName('back').material.onBeforeCompile(shader);
+    const scale = shader.uniforms.luxelScale.value;
+    let brightest = 0;
+    for (let page = 0; page < room.pageCount; page++) for (const value of room.readPage(page)) brightest = Math.max(brightest, value);
+    window.reset();
+    return { brightest, scale };
+  });
+  assert.ok(brightest > 100 && brightest < 65408 * scale, `${brightest} lux of ${65408 * scale}`);
+});
+
+test('input that cannot be is refused by name, and nothing changes', needsBaked, async () => {
+  const seen = await inPage(() => {
+    const { room, why } = window;
+    const { THREE } = window.stage;
+    window.reset();
+    const lamp = room.lights.find(({ name }) => name === 'left lamp');
+    const at = (time) => (room.update(time), lamp.color.r * lamp.intensity);
+    const ramp = { kind: 'keys', keys: [0, 0, 0, 0, 2, 8, 0, 0], loop: false };
+    room.setProgram('left lamp', ramp);
+    const messages = { set: why(() => room.setLight('left lamp', 'white', NaN)) };
+    messages.program = why(() => room.setProgram('left lamp', { kind: 'keys', keys: [2, 5, 5, 5, 1, 5, 5, 5] }));
+    const program = [at(0), at(1), at(2)];
+    lamp.intensity = NaN;
+    messages.field = why(() => room.update(1));
+    messages.after = why(() => room.update(1));
+    lamp.color.r = Infinity;
+    messages.color = why(() => room.update(1));
+    const kept = at(1);
+
+    const bound = new THREE.PointLight(0xffffff, 5);
+    room.bind(bound, 'left lamp');
+    messages.noLight = why(() => room.bind({}, 'left lamp'));
+    messages.boundProgram = why(() => room.setProgram('left lamp', { kind: 'blink', period: 0 }));
+    messages.boundSet = why(() => room.setLight('left lamp', 'white', Infinity));
+    bound.intensity = 7;
+    const stillBound = at(0);
+    bound.intensity = NaN;
+    messages.bound = why(() => room.update(0));
+    bound.intensity = 3;
+    const again = at(0);
+
+    const [monitor] = room.monitors;
+    monitor.strength.setRGB(1, -1, 1);
+    messages.strength = why(() => room.update(0));
+    const strength = monitor.strength.equals(window.strengths[0]);
+    const before = room.readPage(0);
+    messages.page = why(() => room.readLayer(99, 'left lamp'));
+    const same = room.readPage(0).every((value, i) => value === before[i]);
+    window.reset();
+    return { messages, program, kept, stillBound, again, strength, same };
+  });
+  const { messages } = seen;
+  for (const what of ['set', 'field', 'color', 'boundSet', 'bound']) assert.match(messages[what], /layer "left lamp": a colour of .*(NaN|Infinity)/, what);
+  assert.match(messages.noLight, /bound to layer "left lamp" is no light/);
+  assert.match(messages.strength, /monitor "screen": a strength of 1, -1, 1/);
+  for (const what of ['program', 'boundProgram', 'page']) assert.notEqual(messages[what], '', what);
+  assert.equal(messages.after, '');
+  assert.deepEqual(seen.program, [0, 4, 8]);
+  assert.deepEqual([seen.kept, seen.stillBound, seen.again], [4, 7, 3]);
+  assert.ok(seen.strength, 'the strength that was refused is put back');
+  assert.ok(seen.same, 'a layer that cannot be read leaves the others alone');
+});
+
+test('a screen is as bright as the light of its cells, and shows cells that are not as authored', needsBaked, async () => {
+  const seen = await inPage(() => {
+    const { room } = window;
+    const [monitor] = room.monitors;
+    window.reset();
+    const shown = (time = 0) => {
+      room.update(time);
+      const { material } = monitor.meshes[0];
+      const cell = room.lights[monitor.firstLayer];
+      return { cells: material.emissiveMap?.isDataTexture === true, screen: material.emissive.g, cell: cell.color.g * cell.intensity };
+    };
+    const list = { authored: shown() };
+    monitor.strength.multiplyScalar(3);
+    list.stronger = shown();
+    room.setLight('left lamp', 'white', 2);
+    list.unrelated = shown();
+    room.setLight(monitor.firstLayer, 'lime', 5);
+    list.own = shown();
+    monitor.strength.copy(window.strengths[0]);
+    list.ownStill = shown();
+    room.resetLight(monitor.firstLayer);
+    list.reset = shown();
+    for (let k = 0; k < 8; k++) room.setProgram(monitor.firstLayer + k, { kind: 'blink', color: 'lime', intensity: 6, period: 2 });
+    list.on = shown(0.5);
+    list.off = shown(1.5);
+    const { image } = monitor.meshes[0].material.emissiveMap;
+    list.black = image.data.every((value, i) => i % 4 === 3 || value === 0);
+    for (let k = 0; k < 7; k++) room.resetLight(monitor.firstLayer + k);
+    list.oneLeft = shown(0.5).cells;
+    room.resetLight(monitor.firstLayer + 7);
+    list.last = shown(0.5);
+    monitor.setPixels(new Uint8Array(32).fill(255), 4, 2);
+    room.resetLight(monitor.firstLayer);
+    list.pixels = shown().cells;
+    window.reset();
+    return list;
+  });
+  const { authored } = seen;
+  assert.ok(authored.screen > 0 && authored.cell > 0 && !authored.cells, JSON.stringify(authored));
+  const near = (value, wanted) => assert.ok(Math.abs(value - wanted) < 1e-5 * wanted, `${value} and not ${wanted}`);
+  for (const stronger of [seen.stronger, seen.unrelated]) {
+    near(stronger.screen, 3 * authored.screen);
+    near(stronger.cell, 3 * authored.cell);
+  }
+  assert.ok(seen.own.cells && seen.ownStill.cells);
+  assert.deepEqual([seen.own.cell, seen.ownStill.cell], [5, 5]);
+  assert.deepEqual(seen.reset, authored);
+  assert.deepEqual([seen.on.cells, seen.on.cell, seen.off.cells, seen.off.cell, seen.black], [true, 6, true, 0, true]);
+  assert.equal(seen.oneLeft, true);
+  assert.deepEqual(seen.last, authored);
+  assert.equal(seen.pixels, true);
+});
+
+test('smoothing is for pictures that move: still ones and pixels are there at once', needsBaked, async () => {
+  const seen = await inPage(() => {
+    const { room } = window;
+    const [monitor] = room.monitors;
+    window.reset();
+    const canvas = document.createElement('canvas');
+    canvas.width = 8;
+    canvas.height = 4;
+    const context = canvas.getContext('2d');
+    const fill = (color) => {
+      context.fillStyle = color;
+      context.fillRect(0, 0, 8, 4);
+    };
+    const cell = () => (room.update(0), room.lights[monitor.firstLayer].intensity);
+    monitor.strength.setRGB(10, 10, 10);
+    monitor.setPixels(new Uint8Array(32), 4, 2);
+    monitor.smoothing = 0.5;
+    fill('#fff');
+    monitor.setImage(canvas);
+    const still = cell();
+    monitor.setPixels(new Uint8Array(32), 4, 2);
+    const pixels = cell();
+    monitor.setImage(canvas, true);
+    const live = [cell(), cell()];
+    // A video that is paused has the frame it has.
+    const video = Object.assign(document.createElement('canvas'), { width: 8, height: 4, readyState: 2, paused: true, currentTime: 0 });
+    video.getContext('2d').fillRect(0, 0, 8, 4);
+    monitor.setVideo(video);
+    for (let i = 0; i < 30; i++) cell();
+    const paused = cell();
+    monitor.smoothing = 0;
+    window.reset();
+    return { still, pixels, live, paused };
+  });
+  const near = (value, wanted) => assert.ok(Math.abs(value - wanted) < 1e-3, `${value} and not ${wanted}: ${JSON.stringify(seen)}`);
+  near(seen.still, 10);
+  near(seen.pixels, 0);
+  near(seen.live[0], 7.5);
+  near(seen.live[1], 8.75);
+  near(seen.paused, 0);
+});
+
+test('a picture that may not be read brings back the authored one, and keeps no other from being shown', needsBaked, async () => {
+  // A pixel of another site, which says nothing of who may read it.
+  const png = Buffer.from('iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg==', 'base64');
+  const foreign = await serve({ '/': (path, response) => response.writeHead(200, { 'Content-Type': 'image/png' }).end(png) });
+  const seen = await inPage(async (url) => {
+    const { room, why } = window;
+    const [monitor] = room.monitors;
+    window.reset();
+    room.update(0);
+    const { material } = monitor.meshes[0];
+    const state = () => (room.update(0), [material.emissiveMap?.image?.width ?? null, material.emissive.g, room.lights[monitor.firstLayer].intensity]);
+    const authored = state();
+    const image = new Image();
+    image.src = url;
+    await image.decode();
+    const refused = why(() => monitor.setImage(image));
+    const after = state();
+    const canvas = document.createElement('canvas');
+    canvas.width = canvas.height = 1;
+    canvas.getContext('2d').fillRect(0, 0, 1, 1);
+    const good = why(() => monitor.setImage(canvas));
+    window.reset();
+    return { authored, refused, after, good };
+  }, `${foreign.url}pixel.png`);
+  await foreign.close();
+  assert.match(seen.refused, /monitor "screen": .*\(CORS\)/);
+  assert.deepEqual(seen.after, seen.authored);
+  assert.equal(seen.good, '');
+});
+
+test('nodes that are stopped stay where they are, and go on at the time there is', needsBaked, async () => {
+  const places = await inPage(() => {
+    const { room } = window;
+    window.reset();
+    const drone = room.scene.getObjectByName('drone');
+    const at = (time) => (room.update(time), drone.position.x);
+    const list = [at(0.5)];
+    room.stop('fly');
+    list.push(at(0.5), at(1.3));
+    room.stop();
+    list.push(at(1.9));
+    room.play();
+    list.push(at(1));
+    return list;
+  });
+  [0.4, 0.4, 0.4, 0.4, 0.8].forEach((wanted, i) => assert.ok(Math.abs(places[i] - wanted) < 1e-4, `${places}`));
+});
+
+test('uploads go to the lightmap, whatever texture unit was used last', needsBaked, async () => {
+  const error = await inPage(() => {
+    const { renderer } = window.stage;
+    const gl = renderer.getContext();
+    window.look();
+    window.only({ 'left lamp': ['white', 5] });
+    window.room.update(0);
+    while (gl.getError() !== gl.NO_ERROR);
+    renderer.state.activeTexture(gl.TEXTURE0 + 7);
+    renderer.state.bindTexture(gl.TEXTURE_2D_ARRAY, null);
+    gl.bindTexture(gl.TEXTURE_2D_ARRAY, null);
+    window.room.setLight('left lamp', 'white', 6);
+    window.room.update(0);
+    const error = gl.getError();
+    window.reset();
+    return error;
+  });
+  assert.equal(error, 0);
+});
+
+test('shaders of three.js without the functions to replace are an error', needsBaked, async () => {
+  const errors = await inPage(async () => {
+    const { THREE } = window.stage;
+    const { createUniforms, Materials } = await import('/luxel-three/materials.js');
+    const compile = () => {
+      const materials = new Materials(createUniforms(), 'cpu', 'bilinear');
+      const material = materials.lit(new THREE.MeshStandardMaterial());
+      const { vertexShader, fragmentShader } = THREE.ShaderLib.physical;
+      material.onBeforeCompile({ uniforms: {}, vertexShader, fragmentShader });
+    };
+    const kept = THREE.ShaderChunk.lights_pars_begin;
+    const list = [window.why(compile)];
+    for (const name of ['getDistanceAttenuation', 'getSpotAttenuation']) {
+      THREE.ShaderChunk.lights_pars_begin = kept.replaceAll(name, 'attenuation');
+      list.push(window.why(compile));
+    }
+    THREE.ShaderChunk.lights_pars_begin = kept;
+    return list;
+  });
+  assert.equal(errors[0], '');
+  assert.match(errors[1], /three\.js r\d+ have no function getDistanceAttenuation/);
+  assert.match(errors[2], /three\.js r\d+ have no function getSpotAttenuation/);
+});
+
+test('a pack that is longer than its response said arrives whole', needsBaked, async () => {
+  const runtime = await Runtime.instantiate(readFileSync(process.env.LUXEL_WASM));
+  const body = new Uint8Array(200000).map((_, i) => i * 7);
+  const parts = [body.subarray(0, 900), body.subarray(900, 1300), body.subarray(1300)];
+  for (const interrupted of [false, true]) {
+    const stream = new ReadableStream({
+      pull(controller) {
+        controller.enqueue(parts.shift());
+        if (parts.length === 0) controller.close();
+        if (interrupted) runtime.allocate(64);
+      },
+    });
+    const { at, size } = await runtime.receive({ headers: new Headers({ 'content-length': '1200' }), body: stream });
+    assert.equal(size, body.length);
+    assert.deepEqual(runtime.bytes(at, size), body);
+    parts.push(body.subarray(0, 900), body.subarray(900, 1300), body.subarray(1300));
+  }
+});
+
+test('who gives up loading does not keep others from the runtime', needsBaked, async () => {
+  const wasm = readFileSync(process.env.LUXEL_WASM);
+  const server = await serve({ '/': (path, response) => setTimeout(() => response.writeHead(200, { 'Content-Type': 'application/wasm' }).end(wasm), 100) });
+  const controller = new AbortController();
+  const first = Runtime.load(`${server.url}rt.wasm`, controller.signal).catch(({ name }) => name);
+  const second = Runtime.load(`${server.url}rt.wasm`);
+  controller.abort();
+  assert.equal(await first, 'AbortError');
+  assert.ok((await second).memoryBytes > 0);
+  await server.close();
+});
+
 test('the sky is where the file has it, in the background and in reflections', needsBaked, async () => {
   const seen = await inPage(async () => {
     const { THREE, renderer } = window.stage;
@@ -634,6 +957,13 @@ test('what is wrong with a folder is said', needsBaked, async () => {
         window.fetch = originalFetch;
       }
     };
+    const limited = async (limit, value) => {
+      const gl = stage.renderer.getContext();
+      gl.getParameter = (name) => (name === gl[limit] ? value : WebGL2RenderingContext.prototype.getParameter.call(gl, name));
+      const message = await why(() => null);
+      delete gl.getParameter;
+      return message;
+    };
     const manifest = async (response, change) => new Response(JSON.stringify({ ...(await response.json()), ...change }));
     const of = (name, make) => async (url, response) => (url.endsWith(name) ? make(response) : null);
     return {
@@ -643,6 +973,8 @@ test('what is wrong with a folder is said', needsBaked, async () => {
       cut: await why(of('luxel.pack', async (response) => new Response((await response.arrayBuffer()).slice(0, 5000)))),
       scene: await why(of('scene.glb', () => new Response('no such thing at all'))),
       method: await why(() => null, { method: 'magic' }),
+      pages: await limited('MAX_TEXTURE_SIZE', 64),
+      slices: await limited('MAX_ARRAY_TEXTURE_LAYERS', 1),
       aborted: await why(() => null, { signal: AbortSignal.abort(new Error('enough')) }),
     };
   });
@@ -652,6 +984,8 @@ test('what is wrong with a folder is said', needsBaked, async () => {
   assert.match(messages.cut, /luxel\.pack: truncated/);
   assert.match(messages.scene, /scene\.glb: not a GLB/);
   assert.match(messages.method, /"magic" is no method/);
+  assert.match(messages.pages, /128 x 128 texels are more than the 64 x 64 .*--page-size/);
+  assert.match(messages.slices, /2 pages are more than the 1 .*--max-pages/);
   assert.match(messages.aborted, /enough/);
 });
 
