@@ -2,6 +2,7 @@
 // all are the same lamp or material.
 #include "bake/animations.h"
 
+#include "bake/layers.h"
 #include "base/error.h"
 #include "math/hash.h"
 
@@ -132,12 +133,6 @@ cleanup:
 
 // ---- tracks
 
-static bool is_driven(const lx_source *source, const lx_scene *scene, const lx_track *track)
-{
-    if (track->object == LX_TRACK_LIGHT) return source->file_light == (int32_t)track->index;
-    return source->material >= 0 && scene->materials[source->material].file_index == (int32_t)track->index;
-}
-
 // A source of the layer that the track does not drive; NULL: it drives all. *scale: of the values, that of the strongest member.
 static const lx_source *find_undriven(const lx_bake *bake, int32_t layer, const lx_track *track, float *scale)
 {
@@ -145,7 +140,7 @@ static const lx_source *find_undriven(const lx_bake *bake, int32_t layer, const 
     for (uint32_t i = 0; i < bake->source_count; ++i) {
         if (bake->uses[i].layer != layer) continue;
         const lx_source *source = lx_tracer_source(bake->tracer, i);
-        if (!is_driven(source, bake->scene, track)) return source;
+        if (!lx_source_is_driven(bake->scene, source, track)) return source;
         *scale = fmaxf(*scale, track->channel == LX_TRACK_COLOR ? source->color_scale : source->intensity_scale);
     }
     return NULL;
@@ -198,7 +193,7 @@ static lx_result add_tracks(lx_bake *bake, uint32_t *done, lx_error *error)
         for (uint32_t i = 0; i < bake->source_count; ++i) {
             const lx_source *source = lx_tracer_source(bake->tracer, i);
             const int32_t layer = bake->uses[i].layer;
-            if (layer < 0 || done[layer] == t || !is_driven(source, bake->scene, track)) continue;
+            if (layer < 0 || done[layer] == t || !lx_source_is_driven(bake->scene, source, track)) continue;
             done[layer] = t;
             float scale;
             if (bake->layers[layer].monitor) {

@@ -6,6 +6,9 @@
 // A monitor takes as many layers as it has cells, one after the other: T of a cell is that cell at unit white radiance, c its share of the
 // picture: colour of the monitor × mean of the emissive texture there. Monitors of one `luxel_layer` share them. In a `combined` bake a monitor
 // is an emitter like others, with its picture in full.
+//
+// What drives a layer drives all its sources. So grouping that nobody asked for leaves alone what has a program of its own, and joins what an
+// animation of the file drives only with what the same one drives.
 #include "bake/layers.h"
 
 #include "base/error.h"
@@ -41,6 +44,19 @@ static lx_rgb full_color(const lx_source *s)
 static bool is_off(const lx_source *s)
 {
     return is_monitor(s) && lx_rgb_is_black(s->color);
+}
+
+bool lx_source_is_driven(const lx_scene *scene, const lx_source *source, const lx_track *track)
+{
+    if (track->object == LX_TRACK_LIGHT) return source->file_light == (int32_t)track->index;
+    return source->material >= 0 && scene->materials[source->material].file_index == (int32_t)track->index;
+}
+
+bool lx_source_has_track(const lx_scene *scene, const lx_source *source)
+{
+    for (uint32_t t = 0; t < scene->track_count; ++t)
+        if (lx_source_is_driven(scene, source, &scene->tracks[t])) return true;
+    return false;
 }
 
 lx_source_use *lx_uses_combined(const lx_tracer *tracer)
@@ -81,17 +97,37 @@ static lx_result set_key(grouping *g, uint32_t index, char *key, lx_error *error
     return LX_OK;
 }
 
+static bool stays_alone(const lx_source *s)
+{
+    return is_monitor(s) || s->animate;
+}
+
+static char *material_key(const lx_scene *scene, const lx_source *s)
+{
+    const char *name = scene->materials[s->material].name;
+    return name[0] ? lx_strdup(name) : lx_format("material_%d", s->material);
+}
+
+static char *parent_key(const lx_scene *scene, const lx_source *s)
+{
+    if (lx_source_has_track(scene, s))
+        return s->material >= 0 ? material_key(scene, s) : lx_format("lamps of light %d (%s)", s->file_light, unit_of(s->kind));
+    return s->parent_node < 0 ? lx_format("top level (%s)", unit_of(s->kind))
+                              : lx_format("children of node %d (%s)", s->parent_node, unit_of(s->kind));
+}
+
 // Too many: emissive sources of one material first, then what hangs on one parent node (per unit).
 static lx_result group_further(const lx_bake *bake, grouping *g, lx_error *error)
 {
     const lx_scene *scene = bake->scene;
     const uint32_t wanted = bake->desc.max_layers, single = count_layers(g);
     if (single <= wanted) return LX_OK;
+    uint32_t programs = 0;
     for (uint32_t i = 0; i < g->count; ++i) {
         const lx_source *s = lx_tracer_source(bake->tracer, i);
-        if (s->layer || s->kind != LX_SOURCE_EMISSIVE || is_monitor(s)) continue;
-        const char *name = scene->materials[s->material].name;
-        const lx_result result = set_key(g, i, name[0] ? lx_strdup(name) : lx_format("material_%d", s->material), error);
+        programs += !s->layer && !is_monitor(s) && s->animate;
+        if (s->layer || s->kind != LX_SOURCE_EMISSIVE || stays_alone(s)) continue;
+        const lx_result result = set_key(g, i, material_key(scene, s), error);
         if (result != LX_OK) return result;
     }
     uint32_t count = count_layers(g);
@@ -100,18 +136,20 @@ static lx_result group_further(const lx_bake *bake, grouping *g, lx_error *error
         how = "by material and parent node";
         for (uint32_t i = 0; i < g->count; ++i) {
             const lx_source *s = lx_tracer_source(bake->tracer, i);
-            if (s->layer || s->kind == LX_SOURCE_SKY || is_monitor(s)) continue;
-            char *key = s->parent_node < 0 ? lx_format("top level (%s)", unit_of(s->kind))
-                                           : lx_format("children of node %d (%s)", s->parent_node, unit_of(s->kind));
-            const lx_result result = set_key(g, i, key, error);
+            if (s->layer || s->kind == LX_SOURCE_SKY || stays_alone(s)) continue;
+            const lx_result result = set_key(g, i, parent_key(scene, s), error);
             if (result != LX_OK) return result;
         }
         count = count_layers(g);
     }
-    if (count > wanted)
-        return lx_fail(error, LX_ERROR_LIMIT,
-                       "%u layers are more than --max-layers %u, even grouped %s: raise it or name groups with luxel_layer",
-                       count, wanted, how);
+    if (count > wanted) {
+        char *alone = programs > 0 ? lx_format(" (%u for a luxel_animate each)", programs) : lx_strdup("");
+        const lx_result result = lx_fail(
+            error, LX_ERROR_LIMIT, "%u layers%s are more than --max-layers %u, even grouped %s: raise it or name groups with luxel_layer",
+            count, alone ? alone : "", wanted, how);
+        lx_free(alone);
+        return result;
+    }
     lx_log_note(scene->context->log, "%u sources are more than --max-layers %u: grouped %s into %u layers", single, wanted,
                 how, count);
     return LX_OK;

@@ -142,6 +142,59 @@ static void monitors_count_once_and_are_never_grouped(void **state)
     release(&l);
 }
 
+static void too_many_sources_leave_animated_ones_out_of_their_groups(void **state)
+{
+    (void)state;
+    layered l = build(QUAD ",'materials':[{},{}]" LIGHTS("{'type':'point','intensity':100}") ",'nodes':[{'mesh':0},{'name':'a'," LAMP(0) "},"
+                           "{'name':'b'," LAMP(0) "},{'name':'candle'," LAMP(0) ",'extras':{'luxel_animate':'blink 2'}},{'name':'c'," LAMP(0) "}]",
+                      false, LX_OK);
+    assert_logged("note: 4 sources are more than --max-layers 3: grouped by material and parent node into 2 layers");
+    assert_int_equal(l.bake->layer_count, 2);
+    assert_string_equal(l.bake->layers[0].name, "top level (cd)");
+    assert_int_equal(l.bake->layers[0].source_count, 3);
+    assert_string_equal(l.bake->layers[1].name, "candle");
+    assert_int_equal(l.bake->animations->count, 1);
+    assert_int_equal(animation(&l, 0)->layer, 1);
+    release(&l);
+}
+
+static void emissive_source_with_a_program_is_not_grouped_by_its_material(void **state)
+{
+    (void)state;
+    layered l = build(QUAD ",'materials':[{'name':'neon','emissiveFactor':[1,0,0]},{}],'nodes':[{'name':'a','mesh':0},{'name':'b','mesh':0},"
+                           "{'name':'tired','mesh':0,'extras':{'luxel_animate':'flicker'}},{'name':'c','mesh':0}]", false, LX_OK);
+    assert_int_equal(l.bake->layer_count, 2);
+    assert_int_equal(l.bake->layers[0].source_count, 3);
+    assert_string_equal(l.bake->layers[1].name, "tired");
+    assert_int_equal(animation(&l, 0)->layer, 1);
+    release(&l);
+}
+
+static void too_many_animated_sources_are_refused(void **state)
+{
+    (void)state;
+    layered l = build(QUAD ",'materials':[{'emissiveFactor':[1,0,0],'extras':{'luxel_animate':'pulse 2'}},{}],'nodes':[{'name':'a','mesh':0},"
+                           "{'name':'b','mesh':0},{'name':'c','mesh':0},{'name':'d','mesh':0}]", false, LX_ERROR_LIMIT);
+    assert_string_equal(l.error.message, "4 layers (4 for a luxel_animate each) are more than --max-layers 3, even grouped by material and parent "
+                                         "node: raise it or name groups with luxel_layer");
+    release(&l);
+}
+
+static void too_many_lamps_are_grouped_apart_from_those_that_the_file_animates(void **state)
+{
+    (void)state;
+    layered l = build(QUAD ",'materials':[{},{}]" LIGHTS("{'type':'point'},{'type':'point'}") ",'nodes':[{'mesh':0},{'name':'a'," LAMP(0)
+                      "},{'name':'b'," LAMP(1) "},{'name':'c'," LAMP(0) "},{'name':'d'," LAMP(1) "}]"
+                      KEYS("/extensions/KHR_lights_punctual/lights/0/intensity"), false, LX_OK);
+    assert_int_equal(l.bake->layer_count, 2);
+    assert_string_equal(l.bake->layers[0].name, "lamps of light 0 (cd)");
+    assert_int_equal(l.bake->layers[0].source_count, 2);
+    assert_string_equal(l.bake->layers[1].name, "top level (cd)");
+    assert_int_equal(l.bake->animations->count, 1);
+    assert_int_equal(animation(&l, 0)->layer, 0);
+    release(&l);
+}
+
 static void monitor_in_a_combined_bake_is_an_emitter_like_others(void **state)
 {
     (void)state;
@@ -352,6 +405,10 @@ int main(void)
         cmocka_unit_test(monitors_that_cannot_share_cells_are_refused),
         cmocka_unit_test(monitor_that_is_off_shares_cells_with_a_warning),
         cmocka_unit_test(monitors_count_once_and_are_never_grouped),
+        cmocka_unit_test(too_many_sources_leave_animated_ones_out_of_their_groups),
+        cmocka_unit_test(emissive_source_with_a_program_is_not_grouped_by_its_material),
+        cmocka_unit_test(too_many_animated_sources_are_refused),
+        cmocka_unit_test(too_many_lamps_are_grouped_apart_from_those_that_the_file_animates),
         cmocka_unit_test(monitor_in_a_combined_bake_is_an_emitter_like_others),
         cmocka_unit_test(program_drives_its_layer_at_the_authored_colour),
         cmocka_unit_test(schedule_counts_in_the_unit_of_the_file),
