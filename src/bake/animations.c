@@ -25,11 +25,14 @@ static lx_result append(lx_bake *bake, const lx_pack_animation *item, lx_error *
 
 // ---- programs
 
-// c of the layer for an intensity of one of its sources as the file writes it.
-static float layer_intensity(const lx_source *source, const lx_source_use *use, float file_intensity)
+// c of the layer for an intensity of one of its sources as the file writes it. In a group of unlike colours the source's colour is in its weight,
+// not in the layer's; where the layer has the source's colour both cancel out.
+static float layer_intensity(const lx_source *source, const lx_source_use *use, const lx_layer *layer, float file_intensity)
 {
     const float share = lx_rgb_max(use->weight);
-    return file_intensity * source->intensity_scale / (share > 0 ? share : 1);
+    const float own = lx_rgb_max(source->color), shown = fmaxf(layer->color[0], fmaxf(layer->color[1], layer->color[2]));
+    const float tint = own > 0 && shown > 0 ? own / shown : 1;
+    return file_intensity * source->intensity_scale * tint / (share > 0 ? share : 1);
 }
 
 static bool is_grey(const float c[3])
@@ -49,7 +52,7 @@ static lx_result set_schedule(lx_bake *bake, const lx_program *program, const lx
     if (!keys) return lx_fail_memory(error, "animations");
     for (uint32_t i = 0; i < program->key_count; ++i) {
         const lx_program_key *key = &program->keys[i];
-        const float intensity = key->intensity < 0 ? layer->intensity : layer_intensity(source, use, key->intensity);
+        const float intensity = key->intensity < 0 ? layer->intensity : layer_intensity(source, use, layer, key->intensity);
         const float numbers[4] = {key->time_s, key->color.r * intensity, key->color.g * intensity, key->color.b * intensity};
         memcpy(keys + 4 * (size_t)i, numbers, sizeof numbers);
         *sane &= is_sane(numbers[1]) && is_sane(numbers[2]) && is_sane(numbers[3]);
@@ -74,7 +77,7 @@ static lx_result add_program(lx_bake *bake, uint32_t layer_index, uint32_t sourc
         out->color[1] = program->color.g;
         out->color[2] = program->color.b;
     }
-    out->intensity = program->intensity < 0 ? layer->intensity : layer_intensity(source, use, program->intensity);
+    out->intensity = program->intensity < 0 ? layer->intensity : layer_intensity(source, use, layer, program->intensity);
     out->period_s = program->period_s;
     out->phase_s = program->phase_s;
     out->duty = program->duty;

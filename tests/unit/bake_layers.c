@@ -242,6 +242,38 @@ static void schedule_counts_in_the_unit_of_the_file(void **state)
     release(&l);
 }
 
+static void intensity_in_a_group_of_unlike_colours_counts_in_the_unit_of_the_file(void **state)
+{
+    (void)state;
+    layered l = build(QUAD ",'materials':[{},{}]" LIGHTS("{'type':'point','intensity':100,'color':[0.5,0.25,0]},{'type':'point','intensity':100,"
+                      "'color':[0,0,0.25]}") ",'nodes':[{'mesh':0},{'name':'a'," LAMP(0) ",'extras':{'luxel_layer':'s','luxel_animate':"
+                      "'constant intensity=100'}},{'name':'b'," LAMP(1) ",'extras':{'luxel_layer':'s'}},{'name':'c'," LAMP(0) ",'extras':{"
+                      "'luxel_layer':'t'}},{'name':'d'," LAMP(1) ",'extras':{'luxel_layer':'t','luxel_animate':"
+                      "'schedule 10 0=#ffffff*100 5=1,0,0*200'}}]", false, LX_OK);
+    float c[3];
+    assert_near(l.bake->layers[0].intensity, 50, 0);
+    assert_int_equal(lxrt_program_evaluate(&animation(&l, 0)->program, 0, c), LXRT_OK);
+    for (int i = 0; i < 3; ++i) assert_near(c[i], l.bake->layers[0].color[i] * l.bake->layers[0].intensity, 1e-5);
+    assert_int_equal(lxrt_program_evaluate(&animation(&l, 1)->program, 1, c), LXRT_OK);
+    for (int i = 0; i < 3; ++i) assert_near(c[i], 50, 1e-5);
+    assert_int_equal(lxrt_program_evaluate(&animation(&l, 1)->program, 6, c), LXRT_OK);
+    assert_near(c[0], 100, 1e-5);
+    release(&l);
+}
+
+static void intensity_of_a_weaker_lamp_counts_for_that_lamp(void **state)
+{
+    (void)state;
+    layered l = build(QUAD ",'materials':[{},{}]" LIGHTS("{'type':'point','intensity':100,'color':[0.5,0.25,0]},{'type':'point','intensity':25,"
+                      "'color':[0.5,0.25,0]}") ",'nodes':[{'mesh':0},{'name':'a'," LAMP(0) ",'extras':{'luxel_layer':'s'}},{'name':'b'," LAMP(1)
+                      ",'extras':{'luxel_layer':'s','luxel_animate':'constant intensity=25'}}]", false, LX_OK);
+    float c[3];
+    assert_int_equal(lxrt_program_evaluate(&animation(&l, 0)->program, 0, c), LXRT_OK);
+    assert_near(c[0], 50, 1e-5);
+    assert_near(c[1], 25, 1e-5);
+    release(&l);
+}
+
 static void program_of_one_source_drives_the_whole_layer_with_a_warning(void **state)
 {
     (void)state;
@@ -412,6 +444,8 @@ int main(void)
         cmocka_unit_test(monitor_in_a_combined_bake_is_an_emitter_like_others),
         cmocka_unit_test(program_drives_its_layer_at_the_authored_colour),
         cmocka_unit_test(schedule_counts_in_the_unit_of_the_file),
+        cmocka_unit_test(intensity_in_a_group_of_unlike_colours_counts_in_the_unit_of_the_file),
+        cmocka_unit_test(intensity_of_a_weaker_lamp_counts_for_that_lamp),
         cmocka_unit_test(program_of_one_source_drives_the_whole_layer_with_a_warning),
         cmocka_unit_test(programs_that_do_nothing_are_told),
         cmocka_unit_test(two_flickers_differ_unless_they_share_a_seed),
