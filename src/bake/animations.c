@@ -101,6 +101,25 @@ static lx_result add_program(lx_bake *bake, uint32_t layer_index, uint32_t sourc
     return append(bake, &item, error);
 }
 
+static bool same_color(lx_rgb a, lx_rgb b)
+{
+    return a.r == b.r && a.g == b.g && a.b == b.b;
+}
+
+static bool same_program(const lx_program *a, const lx_program *b)
+{
+    if (a->kind != b->kind || a->period_s != b->period_s || a->phase_s != b->phase_s || a->duty != b->duty || a->low != b->low ||
+        a->high != b->high || a->fade_s != b->fade_s || a->intensity != b->intensity || a->has_seed != b->has_seed ||
+        (a->has_seed && a->seed != b->seed) || a->has_color != b->has_color || (a->has_color && !same_color(a->color, b->color)) ||
+        a->key_count != b->key_count)
+        return false;
+    for (uint32_t i = 0; i < a->key_count; ++i)
+        if (a->keys[i].time_s != b->keys[i].time_s || a->keys[i].intensity != b->keys[i].intensity ||
+            !same_color(a->keys[i].color, b->keys[i].color))
+            return false;
+    return true;
+}
+
 // One program per layer: that of its first animated source. `first`: [layer] the source found so far, LX_MISS: none.
 static lx_result add_programs(lx_bake *bake, uint32_t *first, lx_error *error)
 {
@@ -122,7 +141,7 @@ static lx_result add_programs(lx_bake *bake, uint32_t *first, lx_error *error)
         const int32_t layer = bake->uses[i].layer;
         if (layer < 0 || first[layer] == LX_MISS || told[layer]) continue;
         const lx_source *driver = lx_tracer_source(bake->tracer, first[layer]);
-        told[layer] = source->animate != driver->animate;
+        told[layer] = !source->animate || !same_program(source->animate, driver->animate);
         if (told[layer])
             lx_log_warning(log_of(bake), "layer '%s': luxel_animate of '%s' also drives '%s', which has %s", bake->layers[layer].name,
                            driver->name, source->name, source->animate ? "another" : "none");

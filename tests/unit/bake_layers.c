@@ -284,6 +284,38 @@ static void program_of_one_source_drives_the_whole_layer_with_a_warning(void **s
     release(&l);
 }
 
+static void equal_programs_of_one_layer_are_one_program(void **state)
+{
+    (void)state;
+    layered l = build(QUAD ",'materials':[{'emissiveFactor':[1,1,1]},{'emissiveFactor':[1,1,1]}],'nodes':[{'name':'a','mesh':0,'extras':{'luxel_layer':'s',"
+                           "'luxel_animate':'blink 2'}},{'name':'b','mesh':1,'extras':{'luxel_layer':'s','luxel_animate':'blink 2'}},{'name':'c','mesh':0,"
+                           "'extras':{'luxel_layer':'t','luxel_animate':'schedule 10 0=off 5=1,1,1'}},{'name':'d','mesh':1,'extras':{'luxel_layer':'t',"
+                           "'luxel_animate':'schedule 10s 0=off 5=1,1,1'}}]", false, LX_OK);
+    assert_int_equal(l.bake->animations->count, 2);
+    assert_null(strstr(fixture_log, "also drives"));
+    release(&l);
+}
+
+static void unlike_programs_of_one_layer_are_told(void **state)
+{
+    (void)state;
+    static const char *const others[] = {"blink 3", "blink 2 low=0.5", "blink 2 color=#ff0000", "pulse 2", "blink 2 intensity=3"};
+    for (size_t i = 0; i < sizeof others / sizeof *others; ++i) {
+        char members[4096];
+        snprintf(members, sizeof members,
+                 QUAD ",'materials':[{'emissiveFactor':[1,1,1]},{'emissiveFactor':[1,1,1]}],'nodes':[{'name':'a','mesh':0,'extras':{'luxel_layer':'s',"
+                      "'luxel_animate':'blink 2'}},{'name':'b','mesh':1,'extras':{'luxel_layer':'s','luxel_animate':'%s'}}]", others[i]);
+        layered l = build(members, false, LX_OK);
+        assert_logged("warning: layer 's': luxel_animate of 'a' also drives 'b', which has another");
+        release(&l);
+    }
+    layered l = build(QUAD ",'materials':[{'emissiveFactor':[1,1,1]},{'emissiveFactor':[1,1,1]}],'nodes':[{'name':'a','mesh':0,'extras':{'luxel_layer':'s',"
+                           "'luxel_animate':'schedule 10 0=off 5=1,1,1'}},{'name':'b','mesh':1,'extras':{'luxel_layer':'s',"
+                           "'luxel_animate':'schedule 10 0=off 5=1,1,1*2'}}]", false, LX_OK);
+    assert_logged("which has another");
+    release(&l);
+}
+
 static void programs_that_do_nothing_are_told(void **state)
 {
     (void)state;
@@ -447,6 +479,8 @@ int main(void)
         cmocka_unit_test(intensity_in_a_group_of_unlike_colours_counts_in_the_unit_of_the_file),
         cmocka_unit_test(intensity_of_a_weaker_lamp_counts_for_that_lamp),
         cmocka_unit_test(program_of_one_source_drives_the_whole_layer_with_a_warning),
+        cmocka_unit_test(equal_programs_of_one_layer_are_one_program),
+        cmocka_unit_test(unlike_programs_of_one_layer_are_told),
         cmocka_unit_test(programs_that_do_nothing_are_told),
         cmocka_unit_test(two_flickers_differ_unless_they_share_a_seed),
         cmocka_unit_test(animated_intensity_is_scaled_to_the_layer),
