@@ -14,6 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -126,10 +127,11 @@ bool lx_host_has_display(void)
     return is_set("DISPLAY") || is_set("WAYLAND_DISPLAY");
 }
 
-// In a session of its own, so that Ctrl-C here does not reach it, and silent: browsers print much.
+// In a session of its own, so that Ctrl-C here does not reach it, and silent: browsers print much. A shell that ends at once starts it, so that
+// nobody has to wait for it.
 bool lx_host_open_browser(const char *url)
 {
-    char *arguments[] = {"xdg-open", (char *)url, NULL};
+    char *arguments[] = {"sh", "-c", "command -v xdg-open && { xdg-open \"$0\" & }", (char *)url, NULL};
     posix_spawn_file_actions_t files;
     posix_spawnattr_t attributes;
     if (posix_spawn_file_actions_init(&files) != 0) return false;
@@ -150,5 +152,8 @@ bool lx_host_open_browser(const char *url)
                          posix_spawnp(&child, arguments[0], &files, &attributes, arguments, environ) == 0;
     posix_spawnattr_destroy(&attributes);
     posix_spawn_file_actions_destroy(&files);
-    return started;
+    int status = 0;
+    while (started && waitpid(child, &status, 0) < 0)
+        if (errno != EINTR) return false;
+    return started && WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }

@@ -185,7 +185,7 @@ struct jpeg_writer {
     struct jpeg_error_mgr errors;
     jmp_buf escape;
     char message[JMSG_LENGTH_MAX];
-    unsigned char *data; // malloc'ed by the library
+    unsigned char *data; // ours at first; the library's own, malloc'ed, if that was too small
     unsigned long size;
 };
 
@@ -227,7 +227,14 @@ lx_result lx_jpeg_encode(const lx_image *image, int quality, lx_bytes *out, lx_e
 {
     if (image->type != LX_PIXEL_U8 || image->channels != 3)
         return lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "JPEG: only 8-bit RGB can be written");
-    struct jpeg_writer writer = {0};
+    // Room for more than any picture takes at any quality. Should it not do, the library goes on in memory of its own, and only after a success
+    // can be known where that is.
+    size_t room;
+    if (!lx_mul_size((size_t)image->width * image->height, 6, &room) || room > SIZE_MAX - 65536) return lx_fail_memory(error, "JPEG");
+    room += 65536;
+    unsigned char *own = lx_malloc_array(room, 1);
+    if (!own) return lx_fail_memory(error, "JPEG");
+    struct jpeg_writer writer = {.data = own, .size = (unsigned long)room};
     lx_result result = encode_guarded(&writer, image, quality, error);
     if (result == LX_OK) {
         lx_bytes bytes = {.data = lx_malloc_array(writer.size, 1), .size = writer.size};
@@ -239,6 +246,7 @@ lx_result lx_jpeg_encode(const lx_image *image, int quality, lx_bytes *out, lx_e
         }
     }
     jpeg_destroy_compress(&writer.info);
-    free(writer.data);
+    if (writer.data != own) free(writer.data);
+    lx_free(own);
     return result;
 }

@@ -255,12 +255,13 @@ static lx_result make_monitor(lx_gltf_reader *reader, uint32_t index, uint32_t f
                        source->name);
     source->columns = by_node ? node->extras.monitor_columns : material->monitor_columns;
     source->rows = by_node ? node->extras.monitor_rows : material->monitor_rows;
-    source->white = source->color;
+    source->white = lx_rgb_is_black(source->color) ? lx_rgb_grey(1) : source->color;
+    const bool is_off = lx_rgb_is_black(source->color) || !(source->intensity > 0);
     if (!(source->intensity > 0)) source->intensity = 1;
-    if (lx_rgb_is_black(source->color)) {
-        source->white = lx_rgb_grey(1);
-        lx_log_note(reader->log, "monitor '%s': its emissive factor is black, so it is off; a white pixel will be %g nit", source->name,
-                    (double)source->intensity);
+    if (is_off) {
+        source->color = lx_rgb_grey(0);
+        lx_log_note(reader->log, "monitor '%s': its emissive factor or strength is 0, so it is off; a white pixel will be %g nit", source->name,
+                    (double)(source->intensity * lx_rgb_max(source->white)));
     }
     return take_picture(reader, index, &found->monitor[source->material], error);
 }
@@ -287,6 +288,7 @@ static lx_result warn_of_idle_monitors(lx_gltf_reader *reader, lx_error *error)
         const lx_material *material = &scene->materials[m];
         if (material->monitor_columns == 0 || material->file_index < 0 || state[m] != used) continue;
         result = lx_gltf_element(reader, LX_GLTF_MATERIAL, (uint32_t)material->file_index, &object, error);
+        if (result != LX_OK) break;
         lx_log_warning(reader->log, "%s: luxel_monitor has no effect: what has this material %s", object.label,
                        material->unlit ? "is unlit and emits no light" : "moves or is left to real-time light");
     }

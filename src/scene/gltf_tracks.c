@@ -106,8 +106,37 @@ static bool fill_keys(const float *times, const float *values, uint32_t width, b
     return negative;
 }
 
-static lx_result keep_track(lx_gltf_reader *reader, const lx_gltf_object *animation, uint32_t animation_index, const track_target *target,
-                            const lx_gltf_object *sampler, lx_error *error)
+// All channels of an animation begin anew together: when the longest has ended, be it one of light or of what moves. Inputs say in `max` when
+// they end; where that is missing the channel's own keys say it.
+static float animation_end(const lx_gltf_reader *reader, const json_t *samplers)
+{
+    float end = 0;
+    size_t i;
+    json_t *sampler;
+    json_array_foreach(samplers, i, sampler)
+    {
+        const json_t *input = json_object_get(sampler, "input");
+        if (!json_is_integer(input) || json_integer_value(input) < 0 || json_integer_value(input) >= reader->counts[LX_GLTF_ACCESSOR]) continue;
+        const json_t *accessor = json_array_get(reader->elements[LX_GLTF_ACCESSOR], (size_t)json_integer_value(input));
+        const float last = (float)json_number_value(json_array_get(json_object_get(accessor, "max"), 0));
+        if (isfinite(last)) end = fmaxf(end, last);
+    }
+    return end;
+}
+
+// A key at `end` that holds the last one's value.
+static void hold(float *keys, uint32_t key_count, uint32_t width, bool cubic, float end)
+{
+    const size_t stride = 1 + (size_t)width * (cubic ? 3 : 1);
+    float *last = keys + stride * (key_count - 1), *added = last + stride;
+    if (cubic) memset(last + 1 + 2 * (size_t)width, 0, width * sizeof *keys); // leaves the last value level
+    memcpy(added, last, stride * sizeof *keys);
+    *added = end;
+    if (cubic) memset(added + 1, 0, width * sizeof *keys); // and arrives level
+}
+
+static lx_result keep_track(lx_gltf_reader *reader, const lx_gltf_object *animation, uint32_t animation_index, float animation_end_s,
+                            const track_target *target, const lx_gltf_object *sampler, lx_error *error)
 {
     lx_result result = LX_OK;
     lx_scene *scene = reader->scene;
@@ -126,16 +155,19 @@ static lx_result keep_track(lx_gltf_reader *reader, const lx_gltf_object *animat
         goto cleanup;
     }
     const size_t stride = 1 + (size_t)values_per_key * width;
-    LX_TRY(lx_gltf_charge(reader, time_count, stride * sizeof(float), sampler->label, error));
-    float *keys = lx_arena_alloc(&scene->strings, time_count, stride * sizeof *keys);
+    const bool ends_early = times[time_count - 1] < animation_end_s;
+    const uint32_t key_count = time_count + ends_early; // accessors have fewer than 2^32 - 1 elements
+    LX_TRY(lx_gltf_charge(reader, key_count, stride * sizeof(float), sampler->label, error));
+    float *keys = lx_arena_alloc(&scene->strings, key_count, stride * sizeof *keys);
     if (!keys || !lx_array_reserve(&scene->tracks, &reader->track_capacity, (size_t)scene->track_count + 1, sizeof *scene->tracks)) {
         result = lx_fail_memory(error, "animations");
         goto cleanup;
     }
     if (fill_keys(times, values, width, cubic, time_count, keys))
         lx_log_warning(reader->log, "%s: negative light is taken as 0", sampler->label);
+    if (ends_early) hold(keys, time_count, width, cubic, animation_end_s);
     track.keys = keys;
-    track.key_count = time_count;
+    track.key_count = key_count;
     LX_TRY(lx_gltf_name(reader, animation, NULL, "animation", animation_index, &track.name, error));
     scene->tracks[scene->track_count++] = track;
     if (target->object == LX_TRACK_MATERIAL) scene->materials[target->index].emission_animated = true;
@@ -145,8 +177,8 @@ cleanup:
     return result;
 }
 
-static lx_result read_channel(lx_gltf_reader *reader, const lx_gltf_object *animation, uint32_t animation_index, const json_t *samplers,
-                              const lx_gltf_object *channel, lx_error *error)
+static lx_result read_channel(lx_gltf_reader *reader, const lx_gltf_object *animation, uint32_t animation_index, float animation_end_s,
+                              const json_t *samplers, const lx_gltf_object *channel, lx_error *error)
 {
     lx_result result = LX_OK;
     lx_gltf_object target;
@@ -165,7 +197,7 @@ static lx_result read_channel(lx_gltf_reader *reader, const lx_gltf_object *anim
     char what[32];
     snprintf(what, sizeof what, "sampler %d", index);
     const lx_gltf_object sampler = lx_gltf_object_inside(animation, json_array_get(samplers, (size_t)index), what);
-    LX_TRY(keep_track(reader, animation, animation_index, &found, &sampler, error));
+    LX_TRY(keep_track(reader, animation, animation_index, animation_end_s, &found, &sampler, error));
 cleanup:
     return result;
 }
@@ -180,9 +212,10 @@ lx_result lx_gltf_load_tracks(lx_gltf_reader *reader, lx_error *error)
         LX_TRY(lx_gltf_element(reader, LX_GLTF_ANIMATION, i, &animation, error));
         LX_TRY(lx_gltf_get_array(&animation, "samplers", &samplers, &sampler_count, error));
         LX_TRY(lx_gltf_get_array(&animation, "channels", &channels, &count, error));
+        const float end_s = animation_end(reader, samplers);
         for (uint32_t c = 0; c < count; ++c) {
             const lx_gltf_object channel = lx_gltf_object_inside(&animation, json_array_get(channels, c), "channel");
-            LX_TRY(read_channel(reader, &animation, i, samplers, &channel, error));
+            LX_TRY(read_channel(reader, &animation, i, end_s, samplers, &channel, error));
         }
     }
 cleanup:

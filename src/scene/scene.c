@@ -65,10 +65,4 @@ bool lx_material_emits(const lx_material *material)
     return material->emission_animated || (material->emissive_strength > 0 && lx_rgb_max(material->emissive_factor) > 0);
 }
 
-const lx_source *lx_surface_monitor(const lx_scene *scene, uint32_t surface)
-{
-    const int32_t source = scene->surfaces[surface].source;
-    return source >= 0 && scene->sources[source].columns > 0 ? &scene->sources[source] : NULL;
-}
-
 void lx_text_free(char *text) { lx_free(text); }

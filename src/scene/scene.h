@@ -219,9 +219,6 @@ lx_vec4 lx_texture_sample(const lx_scene *scene, const lx_texture_slot *slot, lx
 /// True if a texel of the image has alpha below 1, i.e. the slot can let light through.
 bool lx_texture_has_alpha(const lx_scene *scene, const lx_texture_slot *slot);
 
-/// The monitor that the surface belongs to; NULL: none.
-const lx_source *lx_surface_monitor(const lx_scene *scene, uint32_t surface);
-
 /// True if the material emits: factor and strength above zero, or animated, and not unlit, which ignores emission. (Its texture may still be
 /// black.)
 bool lx_material_emits(const lx_material *material);

@@ -31,10 +31,11 @@ static void answer_error(lx_answer *out, int status)
                                              : "404 Not Found\n");
 }
 
-// Whether the part that is asked for is still a part of this content. Dates are not understood: all of it is sent then.
+// Whether the part that is asked for is still a part of this content. Dates are not understood: all of it is sent then. HEAD has no parts
+// (RFC 9110, 14.2).
 static bool range_applies(const lx_request *request, const char *etag)
 {
-    return request->range && (!request->if_range || strcmp(request->if_range, etag) == 0);
+    return request->range && strcmp(request->method, "GET") == 0 && (!request->if_range || strcmp(request->if_range, etag) == 0);
 }
 
 static void choose_part(const lx_request *request, lx_answer *out)

@@ -152,6 +152,7 @@ def view_answers_head_etag_and_ranges():
             status, _, body = server.ask("/baked/luxel.pack", headers=["Range: " + value])
             expect(status == 200 and body == pack, "%s: %d" % (value, status))
         expect(server.ask("/baked/luxel.pack", headers=["Range: bytes=0-0", "If-Range: " + tag])[0] == 206, "If-Range of this content")
+        expect(server.ask("/baked/luxel.pack", method="HEAD", headers=["Range: bytes=0-0"])[0] == 200, "HEAD has no parts")
         expect(server.ask("/baked/luxel.pack", headers=["Range: bytes=0-0", 'If-Range: "old"'])[0] == 200, "If-Range of other content")
         # A new bake has another tag, and shows without a new server.
         luxel("bake", "room.glb", "-o", "room.baked", "--page-size", "64", "--samples", "1", "--seed", "7", "--quiet", "--no-preview")

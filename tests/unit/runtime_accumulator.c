@@ -286,6 +286,33 @@ static void parts_by_two_threads_give_the_bytes_of_the_whole(void **state)
     }
 }
 
+static void changes_added_by_two_threads_give_the_bytes_of_one(void **state)
+{
+    (void)state;
+    static unsigned char by_one[sizeof target_bytes];
+    for (int threads = 1; threads <= 2; ++threads) {
+        lxrt_accumulator_reset(accumulator);
+        for (uint32_t layer = 0; layer < layer_count; ++layer) set_grey(layer, 1 + (float)layer);
+        lxrt_accumulator_begin(accumulator);
+        update(0, LXRT_FORMAT_RGB9E5);
+        for (int round = 0; round < 20; ++round) {
+            // One layer changes: what has enough others to be worth it, blocks (1, 2) and (3, 3), gets the difference added.
+            set_grey((uint32_t)round % 2, 0.37f * (float)(round + 1));
+            assert_int_equal(lxrt_accumulator_begin(accumulator), 1);
+            half_page halves[2] = {{{1, 0, 0, 0, size, 96}, LXRT_OK}, {{1, 0, 0, 96, size, size - 96}, LXRT_OK}};
+            pthread_t thread;
+            if (threads == 2) assert_int_equal(pthread_create(&thread, NULL, update_half, &halves[1]), 0);
+            if (threads == 1) update_half(&halves[1]);
+            update_half(&halves[0]);
+            if (threads == 2) pthread_join(thread, NULL);
+            assert_int_equal(halves[0].result, LXRT_OK);
+            assert_int_equal(halves[1].result, LXRT_OK);
+        }
+        if (threads == 1) memcpy(by_one, target_bytes, sizeof by_one);
+    }
+    assert_memory_equal(target_bytes, by_one, page_bytes(0, LXRT_FORMAT_RGB9E5));
+}
+
 static void arguments_that_make_no_sense_are_refused(void **state)
 {
     (void)state;
@@ -321,6 +348,7 @@ int main(void)
         TEST(reset_asks_for_the_whole_page_again),
         TEST(two_hundred_changes_stay_within_roundings_of_the_composer),
         TEST(parts_by_two_threads_give_the_bytes_of_the_whole),
+        TEST(changes_added_by_two_threads_give_the_bytes_of_one),
         TEST(arguments_that_make_no_sense_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -72,7 +72,22 @@ static void monitor_with_a_black_factor_is_off_and_can_shine(void **state)
     assert_near(tv->color.r, 0, 0);
     assert_near(tv->white.r, 1, 0);
     assert_near(tv->intensity, 1, 0);
-    assert_logged("note: monitor 'tv': its emissive factor is black, so it is off; a white pixel will be 1 nit");
+    assert_logged("note: monitor 'tv': its emissive factor or strength is 0, so it is off; a white pixel will be 1 nit");
+    lx_scene_destroy(scene);
+}
+
+static void monitor_of_strength_zero_is_off_and_keeps_its_tint(void **state)
+{
+    (void)state;
+    lx_scene *scene = import_quad(
+        QUAD(WITH_UV) ",'extensionsUsed':['KHR_materials_emissive_strength'],'materials':[{'emissiveFactor':[1,0.5,0.25],'extensions':"
+                      "{'KHR_materials_emissive_strength':{'emissiveStrength':0}}}],'nodes':[{'name':'tv','mesh':0,'extras':"
+                      "{'luxel_monitor':'2x1'}}]");
+    const lx_source *tv = source_named(scene, "tv");
+    assert_int_equal(tv->columns, 2);
+    assert_near(tv->color.r, 0, 0);
+    assert_near(tv->white.g, 0.5, 0);
+    assert_near(tv->intensity, 1, 0);
     lx_scene_destroy(scene);
 }
 
@@ -226,6 +241,7 @@ int main(void)
         cmocka_unit_test(monitor_key_on_a_material_gives_the_source_its_grid),
         cmocka_unit_test(monitor_key_on_a_node_wins_over_the_material),
         cmocka_unit_test(monitor_with_a_black_factor_is_off_and_can_shine),
+        cmocka_unit_test(monitor_of_strength_zero_is_off_and_keeps_its_tint),
         cmocka_unit_test(monitor_grids_that_make_no_sense_are_ignored_with_a_warning),
         cmocka_unit_test(monitor_without_texture_coordinates_is_told_and_no_monitor),
         cmocka_unit_test(monitor_with_coordinates_beyond_its_picture_is_told),

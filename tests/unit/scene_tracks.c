@@ -17,7 +17,9 @@ static void track_bin(void)
 #define DATA                                                                                                                          \
     "'bufferViews':[" VIEW(0, 36) "," VIEW(36, 16) "," VIEW(52, 48) "," VIEW(100, 144) "," VIEW(244, 16) "],'accessors':["                \
     NUMBERS(0, 3, "VEC3") "," NUMBERS(1, 4, "SCALAR") "," NUMBERS(2, 4, "SCALAR") "," NUMBERS(2, 12, "SCALAR") ","                     \
-    NUMBERS(3, 4, "VEC3") "," NUMBERS(3, 12, "VEC3") "," NUMBERS(4, 4, "SCALAR") "],'meshes':[{'name':'tri','primitives':[{'attributes':" \
+    NUMBERS(3, 4, "VEC3") "," NUMBERS(3, 12, "VEC3") "," NUMBERS(4, 4, "SCALAR") ","                                          \
+    "{'bufferView':1,'componentType':5126,'count':2,'type':'SCALAR','max':[1]},{'bufferView':2,'componentType':5126,'count':2,'type':'SCALAR'}," \
+    "{'bufferView':2,'componentType':5126,'count':6,'type':'SCALAR'},{'bufferView':1,'componentType':5126,'count':4,'type':'SCALAR','max':[3]}],'meshes':[{'name':'tri','primitives':[{'attributes':" \
     "{'POSITION':0},'material':0}]}]"
 #define LAMPS                                                                                                                         \
     ",'extensionsUsed':['KHR_lights_punctual','KHR_animation_pointer'],'extensions':{'KHR_lights_punctual':{'lights':["               \
@@ -168,10 +170,28 @@ static void tracks_that_do_not_fit_are_refused(void **state)
            "animation 0 'dance' channel: no sampler");
 }
 
+static void track_that_ends_early_is_held_until_its_animation_ends(void **state)
+{
+    (void)state;
+    lx_scene *scene = import_tracks(dark, ANIMATION(SAMPLER(7, 8, "LINEAR") "," SAMPLER(10, 2, "LINEAR") "," SAMPLER(7, 9, "CUBICSPLINE"),
+                                                    CHANNEL(0, "/extensions/KHR_lights_punctual/lights/0/intensity") ","
+                                                    CHANNEL(1, "/extensions/KHR_lights_punctual/lights/1/intensity") ","
+                                                    CHANNEL(2, "/materials/0/extensions/KHR_materials_emissive_strength/emissiveStrength")));
+    assert_int_equal(scene->track_count, 3);
+    static const float held[6] = {0, 1, 1, 2, 3, 2}, level[12] = {0, 1, 2, 3, 1, 4, 5, 0, 3, 0, 5, 0};
+    assert_int_equal(scene->tracks[0].key_count, 3);
+    assert_memory_equal(scene->tracks[0].keys, held, sizeof held);
+    assert_int_equal(scene->tracks[1].key_count, 4); // the longest
+    assert_int_equal(scene->tracks[2].key_count, 3);
+    assert_memory_equal(scene->tracks[2].keys, level, sizeof level);
+    lx_scene_destroy(scene);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(light_intensity_becomes_a_track),
+        cmocka_unit_test(track_that_ends_early_is_held_until_its_animation_ends),
         cmocka_unit_test(light_colour_in_a_cubic_spline_keeps_its_tangents),
         cmocka_unit_test(black_material_with_an_animated_factor_is_a_source),
         cmocka_unit_test(emissive_strength_becomes_a_track_and_factors_above_one_scale_it),
