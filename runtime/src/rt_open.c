@@ -144,7 +144,8 @@ static int check_pages(const lxrt_pack *pack)
 {
     for (uint32_t i = 0; i < pack->pages.count; ++i) {
         const unsigned char *page = lxrt_element(&pack->pages, i);
-        if (lxrt_load_u32(page) != pack->page_size || lxrt_load_u32(page + 4) != pack->page_size || !are_finite(page + 8, 1)) return 0;
+        const float coverage = lxrt_load_f32(page + 8);
+        if (lxrt_load_u32(page) != pack->page_size || lxrt_load_u32(page + 4) != pack->page_size || !(coverage >= 0 && coverage <= 1)) return 0;
     }
     return 1;
 }

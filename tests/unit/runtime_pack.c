@@ -171,6 +171,8 @@ static void every_documented_rule_is_checked(void **state)
         {40, 64, LXRT_ERROR_CORRUPT},
         {44, UINT32_MAX, LXRT_ERROR_CORRUPT},
         {44, 6, LXRT_ERROR_CORRUPT}, // the blocks are missing
+        {pages_at + 8, 0xbf800000, LXRT_ERROR_CORRUPT}, // a coverage of -1
+        {pages_at + 8, 0x3f800001, LXRT_ERROR_CORRUPT}, // beyond 1
         {48, file_bytes - 32, LXRT_ERROR_CORRUPT},
         {52, UINT32_MAX, LXRT_ERROR_CORRUPT},
         {directory_at, 0x52594c41, LXRT_OK},                             // "ALYR": unknown as well
