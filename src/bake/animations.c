@@ -234,6 +234,22 @@ cleanup:
     return result;
 }
 
+// A combined bake has one layer for all, which nothing may drive.
+static void note_dropped(const lx_bake *bake)
+{
+    uint32_t count = 0;
+    const char *name = "";
+    for (uint32_t i = 0; i < bake->source_count; ++i) {
+        const lx_source *source = lx_tracer_source(bake->tracer, i);
+        if (!source->animate && !lx_source_has_track(bake->scene, source)) continue;
+        if (count++ == 0) name = source->name;
+    }
+    if (count == 1)
+        lx_log_note(log_of(bake), "what animates '%s' is not baked: a combined layer stays as authored", name);
+    if (count > 1)
+        lx_log_note(log_of(bake), "what animates '%s' and %u more is not baked: a combined layer stays as authored", name, count - 1);
+}
+
 lx_result lx_animations_build(lx_bake *bake, lx_error *error)
 {
     lx_result result = LX_OK;
@@ -243,7 +259,10 @@ lx_result lx_animations_build(lx_bake *bake, lx_error *error)
         result = lx_fail_memory(error, "animations");
         goto cleanup;
     }
-    if (bake->desc.combined) goto cleanup;
+    if (bake->desc.combined) {
+        note_dropped(bake);
+        goto cleanup;
+    }
     LX_TRY(add_programs(bake, scratch, error));
     LX_TRY(add_tracks(bake, scratch, error));
 cleanup:

@@ -204,6 +204,20 @@ static void monitor_in_a_combined_bake_is_an_emitter_like_others(void **state)
     assert_false(lx_tracer_is_told_by_cell(l.bake->tracer, 0));
     assert_null(l.bake->uses[0].cells);
     assert_int_equal(l.bake->animations->count, 0);
+    assert_logged("note: what animates 'light_0' is not baked: a combined layer stays as authored");
+    release(&l);
+}
+
+static void combined_bake_tells_once_of_programs_and_animations_that_it_leaves_out(void **state)
+{
+    (void)state;
+    layered l = build(QUAD ",'materials':[{},{'emissiveFactor':[1,1,1]}]" LIGHTS("{'type':'point'},{'type':'point'}") ",'nodes':[{'mesh':0},{'name':'still',"
+                      LAMP(1) "},{'name':'a'," LAMP(0) "},{'name':'b'," LAMP(1) ",'extras':{'luxel_animate':'blink 2'}},{'name':'c','mesh':1}]"
+                      KEYS("/extensions/KHR_lights_punctual/lights/0/intensity"), true, LX_OK);
+    assert_logged("note: what animates 'a' and 1 more is not baked: a combined layer stays as authored");
+    release(&l);
+    l = build(QUAD ",'materials':[{'emissiveFactor':[1,1,1]},{}],'nodes':[{'mesh':0}]", true, LX_OK);
+    assert_null(strstr(fixture_log, "what animates"));
     release(&l);
 }
 
@@ -474,6 +488,7 @@ int main(void)
         cmocka_unit_test(too_many_animated_sources_are_refused),
         cmocka_unit_test(too_many_lamps_are_grouped_apart_from_those_that_the_file_animates),
         cmocka_unit_test(monitor_in_a_combined_bake_is_an_emitter_like_others),
+        cmocka_unit_test(combined_bake_tells_once_of_programs_and_animations_that_it_leaves_out),
         cmocka_unit_test(program_drives_its_layer_at_the_authored_colour),
         cmocka_unit_test(schedule_counts_in_the_unit_of_the_file),
         cmocka_unit_test(intensity_in_a_group_of_unlike_colours_counts_in_the_unit_of_the_file),
