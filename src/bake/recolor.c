@@ -5,7 +5,6 @@
 #include "scene/program.h"
 
 #include <ctype.h>
-#include <stdlib.h>
 #include <string.h>
 
 bool lx_glob_matches(const char *pattern, const char *text)
@@ -76,17 +75,6 @@ static void list_nearest(const lx_baked *baked, const char *name, char *out, siz
     }
 }
 
-// A number from the front of *text, zero or more and finite; *text moves behind it.
-static bool take_number(const char **text, float *out)
-{
-    if (!(**text >= '0' && **text <= '9') && **text != '.') return false; // no sign, no "inf", no spaces
-    char *end;
-    *out = strtof(*text, &end);
-    if (end == *text || !(*out < INFINITY)) return false;
-    *text = end;
-    return true;
-}
-
 // COLOUR[*INTENSITY]; *has_intensity tells whether the second part is there.
 static bool parse_value(const char *text, float color[3], bool *has_intensity, float *intensity)
 {
@@ -98,7 +86,7 @@ static bool parse_value(const char *text, float color[3], bool *has_intensity, f
     *has_intensity = *text == '*';
     if (*has_intensity) {
         ++text;
-        if (!take_number(&text, intensity)) return false;
+        if (!lx_take_number(&text, intensity)) return false;
     }
     return *text == '\0';
 }

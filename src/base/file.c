@@ -92,6 +92,18 @@ static lx_result flush_folder_of(const char *path)
     return LX_OK;
 }
 
+static bool write_all(int file, const char *data, size_t size)
+{
+    while (size > 0) {
+        const ssize_t count = write(file, data, size);
+        if (count < 0 && errno == EINTR) continue;
+        if (count <= 0) return false;
+        data += count;
+        size -= (size_t)count;
+    }
+    return true;
+}
+
 lx_result lx_file_write(const char *path, const void *data, size_t size, lx_error *error)
 {
     lx_result result = LX_OK;
@@ -105,14 +117,9 @@ lx_result lx_file_write(const char *path, const void *data, size_t size, lx_erro
         goto cleanup;
     }
     created = true;
-    for (size_t done = 0; done < size;) {
-        const ssize_t count = write(file, (const char *)data + done, size - done);
-        if (count < 0 && errno == EINTR) continue;
-        if (count <= 0) {
-            result = lx_fail(error, LX_ERROR_IO, "cannot write: %s", strerror(errno));
-            goto cleanup;
-        }
-        done += (size_t)count;
+    if (!write_all(file, data, size)) {
+        result = lx_fail(error, LX_ERROR_IO, "cannot write: %s", strerror(errno));
+        goto cleanup;
     }
     const bool flushed = fsync(file) == 0;
     const int flush_errno = errno;
@@ -190,18 +197,6 @@ lx_result lx_file_open_below(const char *folder, const char *path, lx_open_file 
         .modified_ns = (int64_t)info.st_mtim.tv_sec * 1000000000 + info.st_mtim.tv_nsec,
     };
     return LX_OK;
-}
-
-static bool write_all(int file, const char *data, size_t size)
-{
-    while (size > 0) {
-        const ssize_t count = write(file, data, size);
-        if (count < 0 && errno == EINTR) continue;
-        if (count <= 0) return false;
-        data += count;
-        size -= (size_t)count;
-    }
-    return true;
 }
 
 lx_result lx_open_file_copy(const lx_open_file *file, const char *path, lx_error *error)

@@ -21,8 +21,7 @@ const char *lx_program_name(lx_program_kind kind)
     return names[kind];
 }
 
-// A plain decimal number, zero or more, from the front of *text: no sign, no "inf", no hexadecimal.
-static bool take_number(const char **text, float *out)
+bool lx_take_number(const char **text, float *out)
 {
     const char *at = *text;
     if (!isdigit((unsigned char)*at) && *at != '.') return false;
@@ -60,7 +59,7 @@ bool lx_take_color(const char **text, lx_rgb *out)
     } else {
         for (int i = 0; i < 3; ++i) {
             if (i > 0 && *at++ != ',') return false;
-            if (!take_number(&at, &v[i])) return false;
+            if (!lx_take_number(&at, &v[i])) return false;
         }
     }
     *out = lx_rgb_of(v[0], v[1], v[2]);
@@ -76,10 +75,10 @@ static bool take_time(const char **text, float *out)
         float seconds;
     } units[] = {{"ms", 1e-3f}, {"min", 60}, {"h", 3600}, {"s", 1}};
     float number, minutes;
-    if (!take_number(text, &number)) return false;
+    if (!lx_take_number(text, &number)) return false;
     if (**text == ':') {
         ++*text;
-        if (!take_number(text, &minutes) || !(minutes < 60)) return false;
+        if (!lx_take_number(text, &minutes) || !(minutes < 60)) return false;
         *out = number * 3600 + minutes * 60;
         return *out <= longest_s;
     }
@@ -106,11 +105,11 @@ static bool read_value(const char *text, value_kind kind, void *out)
         if (!lx_take_color(&text, out)) return false;
         break;
     case value_seed:
-        if (!take_number(&text, &number) || number > 1e9f) return false;
+        if (!lx_take_number(&text, &number) || number > 1e9f) return false;
         *(uint32_t *)out = (uint32_t)number;
         break;
     default:
-        if (!take_number(&text, out) || (kind == value_share && *(float *)out > 1)) return false;
+        if (!lx_take_number(&text, out) || (kind == value_share && *(float *)out > 1)) return false;
     }
     return *text == '\0';
 }
@@ -159,7 +158,7 @@ static lx_result read_key(const char *word, lx_program_key *out, lx_error *error
     bool good = take_time(&at, &out->time_s) && *at++ == '=' && lx_take_color(&at, &out->color);
     if (good && *at == '*') {
         ++at;
-        good = take_number(&at, &out->intensity);
+        good = lx_take_number(&at, &out->intensity);
     }
     if (!good || *at)
         return lx_fail(error, LX_ERROR_FORMAT, "'%.40s' is not TIME=COLOUR*INTENSITY (#rrggbb, r,g,b or off)", word);

@@ -48,6 +48,9 @@ const char *lx_program_name(lx_program_kind kind);
 /// Reads `text`. LX_ERROR_FORMAT with a message that says what cannot be read.
 lx_result lx_program_parse(const char *text, lx_arena *arena, lx_program *out, lx_error *error);
 
+/// A number from the front of *text, which moves behind it: decimal, zero or more, finite; no sign, no "inf", no
+/// hexadecimal, no spaces before it.
+bool lx_take_number(const char **text, float *out);
 /// COLOUR from the front of *text, which moves behind it: #rrggbb (sRGB), r,g,b (linear, zero or more) or off.
 bool lx_take_color(const char **text, lx_rgb *out);
 
