@@ -102,6 +102,12 @@ static bool stays_alone(const lx_source *s)
     return is_monitor(s) || s->animate;
 }
 
+// All that emit by one material share the program it carries; a node's own program is its node's alone.
+static bool animated_by_node(const lx_scene *scene, const lx_source *s)
+{
+    return s->animate && (s->material < 0 || s->animate != scene->materials[s->material].animate);
+}
+
 static char *material_key(const lx_scene *scene, const lx_source *s)
 {
     const char *name = scene->materials[s->material].name;
@@ -125,8 +131,8 @@ static lx_result group_further(const lx_bake *bake, grouping *g, lx_error *error
     uint32_t programs = 0;
     for (uint32_t i = 0; i < g->count; ++i) {
         const lx_source *s = lx_tracer_source(bake->tracer, i);
-        programs += !s->layer && !is_monitor(s) && s->animate;
-        if (s->layer || s->kind != LX_SOURCE_EMISSIVE || stays_alone(s)) continue;
+        programs += !s->layer && !is_monitor(s) && animated_by_node(scene, s);
+        if (s->layer || s->kind != LX_SOURCE_EMISSIVE || is_monitor(s) || animated_by_node(scene, s)) continue;
         const lx_result result = set_key(g, i, material_key(scene, s), error);
         if (result != LX_OK) return result;
     }

@@ -170,11 +170,22 @@ static void emissive_source_with_a_program_is_not_grouped_by_its_material(void *
     release(&l);
 }
 
+static void emitters_of_an_animated_material_are_grouped_with_its_program(void **state)
+{
+    (void)state;
+    layered l = build(QUAD ",'materials':[{'name':'bulb','emissiveFactor':[1,0,0],'extras':{'luxel_animate':'pulse 2'}},{}],'nodes':["
+                           "{'name':'a','mesh':0},{'name':'b','mesh':0},{'name':'c','mesh':0},{'name':'d','mesh':0}]", false, LX_OK);
+    assert_int_equal(l.bake->layer_count, 1);
+    assert_string_equal(l.bake->layers[0].name, "bulb");
+    assert_int_equal(l.bake->animations->count, 1);
+    release(&l);
+}
+
 static void too_many_animated_sources_are_refused(void **state)
 {
     (void)state;
-    layered l = build(QUAD ",'materials':[{'emissiveFactor':[1,0,0],'extras':{'luxel_animate':'pulse 2'}},{}],'nodes':[{'name':'a','mesh':0},"
-                           "{'name':'b','mesh':0},{'name':'c','mesh':0},{'name':'d','mesh':0}]", false, LX_ERROR_LIMIT);
+    layered l = build(QUAD ",'materials':[{'emissiveFactor':[1,0,0]},{}],'nodes':[{'extras':{'luxel_animate':'pulse 2'},'children':[1,2,3,4]},"
+                           "{'name':'a','mesh':0},{'name':'b','mesh':0},{'name':'c','mesh':0},{'name':'d','mesh':0}]", false, LX_ERROR_LIMIT);
     assert_string_equal(l.error.message, "4 layers (4 for a luxel_animate each) are more than --max-layers 3, even grouped by material and parent "
                                          "node: raise it or name groups with luxel_layer");
     release(&l);
@@ -485,6 +496,7 @@ int main(void)
         cmocka_unit_test(monitors_count_once_and_are_never_grouped),
         cmocka_unit_test(too_many_sources_leave_animated_ones_out_of_their_groups),
         cmocka_unit_test(emissive_source_with_a_program_is_not_grouped_by_its_material),
+        cmocka_unit_test(emitters_of_an_animated_material_are_grouped_with_its_program),
         cmocka_unit_test(too_many_animated_sources_are_refused),
         cmocka_unit_test(too_many_lamps_are_grouped_apart_from_those_that_the_file_animates),
         cmocka_unit_test(monitor_in_a_combined_bake_is_an_emitter_like_others),
