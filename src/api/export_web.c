@@ -4,6 +4,7 @@
 // anything else is never replaced.
 #include "luxel/serve.h"
 
+#include "base/builder.h"
 #include "base/error.h"
 #include "store/folder.h"
 #include "store/manifest.h"
@@ -67,19 +68,16 @@ lx_result lx_export_web_check(const char *folder, lx_error *error)
 typedef struct site_copy {
     lx_new_folder fresh;
     const char *viewer, *baked;
-    char *list; // of the files so far
+    lx_builder list; // of the files so far
     lx_web_export sum;
 } site_copy;
 
-static lx_result note_file(site_copy *copy, const char *path, uint64_t bytes, lx_error *error)
+static void note_file(site_copy *copy, const char *path, uint64_t bytes)
 {
-    char *longer = lx_format("%s%s\n", copy->list ? copy->list : "", path);
-    if (!longer) return lx_fail_memory(error, "export");
-    lx_free(copy->list);
-    copy->list = longer;
+    lx_builder_add(&copy->list, path);
+    lx_builder_add(&copy->list, "\n");
     ++copy->sum.file_count;
     copy->sum.bytes += bytes;
-    return LX_OK;
 }
 
 // from/name to the site's `to`. Messages name the file.
@@ -95,7 +93,7 @@ static lx_result copy_file(site_copy *copy, const char *from, const char *name, 
         result = lx_open_file_copy(&file, path, error);
         if (result != LX_OK) lx_error_prefix(error, "%s", path);
     }
-    if (result == LX_OK) result = note_file(copy, to, file.size, error);
+    if (result == LX_OK) note_file(copy, to, file.size);
     lx_open_file_close(&file);
     lx_free(path);
     return result;
@@ -151,7 +149,7 @@ static lx_result copy_baked(site_copy *copy, lx_error *error)
     }
     LX_TRY(create_folder(copy, "baked", error));
     LX_TRY(lx_new_folder_write(&copy->fresh, "baked/" LX_MANIFEST_NAME, lean, strlen(lean), error));
-    LX_TRY(note_file(copy, "baked/" LX_MANIFEST_NAME, strlen(lean), error));
+    note_file(copy, "baked/" LX_MANIFEST_NAME, strlen(lean));
     LX_TRY(copy_baked_file(copy, manifest.pack, false, error));
     if (manifest.scene) LX_TRY(copy_baked_file(copy, manifest.scene, false, error));
     if (manifest.has_sky) LX_TRY(copy_baked_file(copy, manifest.sky.file, false, error));
@@ -177,11 +175,15 @@ lx_result lx_export_web(const char *viewer, const char *baked, const char *folde
     }
     LX_TRY(lx_folder_walk(viewer, copy_viewer_entry, &copy, error));
     LX_TRY(copy_baked(&copy, error));
-    LX_TRY(lx_new_folder_write(&copy.fresh, list_name, copy.list, strlen(copy.list), error));
+    if (copy.list.failed) {
+        result = lx_fail_memory(error, "export");
+        goto cleanup;
+    }
+    LX_TRY(lx_new_folder_write(&copy.fresh, list_name, copy.list.text, copy.list.length, error));
     LX_TRY(lx_new_folder_commit(&copy.fresh, error));
     if (out) *out = copy.sum;
 cleanup:
     lx_new_folder_abort(&copy.fresh);
-    lx_free(copy.list);
+    lx_builder_release(&copy.list);
     return result;
 }

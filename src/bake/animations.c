@@ -8,8 +8,6 @@
 
 #include <string.h>
 
-static const float too_bright = 1e27f; // what the runtime refuses to sum
-
 static lx_log *log_of(const lx_bake *bake)
 {
     return bake->scene->context->log;
@@ -42,7 +40,7 @@ static bool is_grey(const float c[3])
 
 static bool is_sane(float value)
 {
-    return fabsf(value) <= too_bright;
+    return fabsf(value) <= LX_PACK_MOST_LIGHT;
 }
 
 static lx_result set_schedule(lx_bake *bake, const lx_program *program, const lx_source *source, const lx_source_use *use,
@@ -179,8 +177,8 @@ static bool is_there(const lx_bake *bake, const lx_pack_animation *item)
 
 static lx_result add_track(lx_bake *bake, uint32_t layer, const lx_track *track, float scale, lx_error *error)
 {
-    const bool color = track->channel == LX_TRACK_COLOR, cubic = track->interpolation == LX_CUBIC;
-    const size_t width = color ? 3 : 1, stride = 1 + width * (cubic ? 3 : 1);
+    const bool color = track->channel == LX_TRACK_COLOR;
+    const size_t stride = lx_track_stride(track);
     lx_pack_animation item = {.name = track->name, .layer = layer, .channel = color ? LX_PACK_CHANNEL_COLOR : LX_PACK_CHANNEL_INTENSITY,
                               .program = lxrt_program_default()};
     if (is_there(bake, &item)) {

@@ -106,11 +106,8 @@ static void list_animations(const lx_bake *bake, lx_manifest *manifest)
         const lx_pack_animation *item = &bake->animations->items[i];
         const lxrt_program *program = &item->program;
         float duration_s = program->kind == LXRT_PROGRAM_CONSTANT ? 0 : program->period_s;
-        if (program->kind == LXRT_PROGRAM_KEYS) { // the time of the last key
-            const size_t width = item->channel == LX_PACK_CHANNEL_INTENSITY ? 1 : 3;
-            const size_t stride = 1 + width * (program->interpolation == LXRT_CUBIC ? 3 : 1);
-            duration_s = program->keys[stride * (program->key_count - 1)];
-        }
+        if (program->kind == LXRT_PROGRAM_KEYS) // the time of the last key
+            duration_s = program->keys[(size_t)lx_pack_key_stride(item) * (program->key_count - 1)];
         manifest->animations[manifest->animation_count++] = (lx_manifest_animation){
             .name = item->name,
             .layer = item->layer,

@@ -106,11 +106,10 @@ static json_t *describe_track(const lx_track *track)
 {
     static const char *const interpolations[] = {"STEP", "LINEAR", "CUBICSPLINE"};
     static const char *const properties[2][2] = {{"color", "intensity"}, {"emissiveFactor", "emissiveStrength"}};
-    const size_t width = track->channel == LX_TRACK_COLOR ? 3 : 1, stride = 1 + width * (track->interpolation == LX_CUBIC ? 3 : 1);
     return json_pack("{s:s,s:s,s:I,s:s,s:s,s:I,s:o}", "name", track->name, "object", track->object == LX_TRACK_LIGHT ? "light" : "material",
                      "index", (json_int_t)track->index, "property", properties[track->object][track->channel], "interpolation",
                      interpolations[track->interpolation], "keys", (json_int_t)track->key_count, "duration",
-                     number(track->keys[stride * (track->key_count - 1)]));
+                     number(track->keys[lx_track_stride(track) * (track->key_count - 1)]));
 }
 
 static json_t *describe_warnings(const lx_scene *scene)

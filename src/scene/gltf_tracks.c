@@ -125,9 +125,8 @@ static float animation_end(const lx_gltf_reader *reader, const json_t *samplers)
 }
 
 // A key at `end` that holds the last one's value.
-static void hold(float *keys, uint32_t key_count, uint32_t width, bool cubic, float end)
+static void hold(float *keys, uint32_t key_count, size_t stride, uint32_t width, bool cubic, float end)
 {
-    const size_t stride = 1 + (size_t)width * (cubic ? 3 : 1);
     float *last = keys + stride * (key_count - 1), *added = last + stride;
     if (cubic) memset(last + 1 + 2 * (size_t)width, 0, width * sizeof *keys); // leaves the last value level
     memcpy(added, last, stride * sizeof *keys);
@@ -154,7 +153,7 @@ static lx_result keep_track(lx_gltf_reader *reader, const lx_gltf_object *animat
         result = lx_fail(error, LX_ERROR_FORMAT, "%s: %u values for %u keys", sampler->label, value_count, time_count);
         goto cleanup;
     }
-    const size_t stride = 1 + (size_t)values_per_key * width;
+    const size_t stride = lx_track_stride(&track);
     const bool ends_early = times[time_count - 1] < animation_end_s;
     const uint32_t key_count = time_count + ends_early; // accessors have fewer than 2^32 - 1 elements
     LX_TRY(lx_gltf_charge(reader, key_count, stride * sizeof(float), sampler->label, error));
@@ -165,7 +164,7 @@ static lx_result keep_track(lx_gltf_reader *reader, const lx_gltf_object *animat
     }
     if (fill_keys(times, values, width, cubic, time_count, keys))
         lx_log_warning(reader->log, "%s: negative light is taken as 0", sampler->label);
-    if (ends_early) hold(keys, time_count, width, cubic, animation_end_s);
+    if (ends_early) hold(keys, time_count, stride, width, cubic, animation_end_s);
     track.keys = keys;
     track.key_count = key_count;
     LX_TRY(lx_gltf_name(reader, animation, NULL, "animation", animation_index, &track.name, error));

@@ -172,6 +172,13 @@ typedef struct lx_track {
     uint32_t key_count;
 } lx_track;
 
+/// Numbers from one key of a track to the next.
+static inline size_t lx_track_stride(const lx_track *track)
+{
+    const size_t width = track->channel == LX_TRACK_COLOR ? 3 : 1;
+    return 1 + width * (track->interpolation == LX_CUBIC ? 3 : 1);
+}
+
 typedef struct lx_camera {
     const char *name; ///< Of the node, else of the camera, else "camera_K".
     lx_mat4 transform; ///< Looks along -Z, +Y up. Scale removed.

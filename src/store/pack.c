@@ -106,8 +106,7 @@ static bool has_keys(const lxrt_program *program)
     return program->kind == LXRT_PROGRAM_KEYS || program->kind == LXRT_PROGRAM_SCHEDULE;
 }
 
-// Numbers of a key: its time and its value, with cubic interpolation two tangents more.
-static uint32_t key_stride(const lx_pack_animation *animation)
+uint32_t lx_pack_key_stride(const lx_pack_animation *animation)
 {
     const uint32_t width = animation->channel == LX_PACK_CHANNEL_INTENSITY ? 1 : 3;
     const bool cubic = animation->program.kind == LXRT_PROGRAM_KEYS && animation->program.interpolation == LXRT_CUBIC;
@@ -116,7 +115,7 @@ static uint32_t key_stride(const lx_pack_animation *animation)
 
 static uint64_t key_numbers(const lx_pack_animation *animation)
 {
-    return has_keys(&animation->program) ? (uint64_t)animation->program.key_count * key_stride(animation) : 0;
+    return has_keys(&animation->program) ? (uint64_t)animation->program.key_count * lx_pack_key_stride(animation) : 0;
 }
 
 // What is wrong with an animation; NULL if nothing is.
@@ -133,7 +132,7 @@ static const char *animation_problem(const lx_pack_animation *animation)
     for (uint64_t i = 0; i < key_numbers(animation); ++i)
         if (!isfinite(program.keys[i])) return "a key is not finite";
     for (uint32_t i = 1; keyed && i < program.key_count; ++i)
-        if (program.keys[(size_t)i * key_stride(animation)] < program.keys[(size_t)(i - 1) * key_stride(animation)])
+        if (program.keys[(size_t)i * lx_pack_key_stride(animation)] < program.keys[(size_t)(i - 1) * lx_pack_key_stride(animation)])
             return "keys are not in the order of their times";
     if (animation->channel == LX_PACK_CHANNEL_INTENSITY) program.kind = LXRT_PROGRAM_CONSTANT; // its keys are no colours
     if (lxrt_program_evaluate(&program, 0, unused) != LXRT_OK)
@@ -166,7 +165,7 @@ static lx_result check_monitors(const lx_pack_desc *desc, lx_error *error)
             return lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "luxel.pack: monitor %s: %u x %u cells from layer %u on, but %u layers",
                            monitor->name, monitor->columns, monitor->rows, monitor->first_layer, desc->layer_count);
         for (int k = 0; k < 3; ++k)
-            if (!(monitor->strength[k] >= 0 && monitor->strength[k] <= 1e27f))
+            if (!(monitor->strength[k] >= 0 && monitor->strength[k] <= LX_PACK_MOST_LIGHT))
                 return lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "luxel.pack: monitor %s: strength %g is not possible", monitor->name,
                                (double)monitor->strength[k]);
     }

@@ -60,6 +60,11 @@ typedef struct lx_pack_animation {
     lxrt_program program;
 } lx_pack_animation;
 
+/// Numbers from one key of an animation to the next: its time and its value, with cubic interpolation two tangents more.
+uint32_t lx_pack_key_stride(const lx_pack_animation *animation);
+
+#define LX_PACK_MOST_LIGHT 1e27f ///< The largest channel of a colour, or of a monitor's strength, that the runtime sums.
+
 /// Everything but the texels. Arrays are borrowed during lx_pack_begin alone.
 typedef struct lx_pack_desc {
     uint32_t page_size, page_count, level_count;
