@@ -20,16 +20,34 @@ typedef struct lx_sky_desc {
 
 /// How light is followed. Shared by bakes, irradiance probes and path-traced pictures.
 typedef struct lx_transport_desc {
-    uint32_t bounces;       ///< 0: direct light only; LX_BOUNCES_INF. Default 8. A finite number is the truncated series.
+    uint32_t bounces;       ///< 0: direct light only; LX_BOUNCES_INF. Default 8; bakes: LX_BOUNCES_INF. A finite number is the truncated series.
     bool coloured_shadows;  ///< Blended surfaces tint the light that passes. Default false.
     lx_sky_desc sky;
     uint32_t seed;          ///< Same seed, same bits, for any number of threads. Default 1.
 } lx_transport_desc;
 
+typedef enum lx_integrator {
+    LX_INTEGRATOR_GATHER, ///< Fast: one gather ray serves all layers and all bounces (irradiance cache).
+    LX_INTEGRATOR_PATH,   ///< The unbiased referee.
+} lx_integrator;
+
+typedef enum lx_denoiser {
+    LX_DENOISE_NONE,
+    LX_DENOISE_BUILTIN, ///< Guided by the estimate's own variance and by geometry.
+    LX_DENOISE_OIDN,    ///< Intel Open Image Denoise, where its library is installed.
+} lx_denoiser;
+
 /// What to bake and how well. Fill with lx_bake_desc_default(), then change what you need.
 typedef struct lx_bake_desc {
     lx_transport_desc transport;
-    uint32_t samples;     ///< Paths per texel, 1 … 16 M. Error falls with 1/sqrt(n). Default 256.
+    lx_integrator integrator; ///< Default LX_INTEGRATOR_GATHER.
+    uint32_t samples;     ///< Gather rays or paths per texel at most, 1 … 16 M. Error falls with 1/sqrt(n). Default 256.
+    float noise;          ///< Gather: a tile of texels is done where each layer's standard error over max(texel, 1 % of the layer's mean), root mean
+                          ///< square, is below it. 0: all samples are taken. Default 0.02.
+    double time_s;        ///< Gather: samples are added in rounds until this much time has passed; `samples` and `noise` count too. The result depends on
+                          ///< the machine. 0 (default): no limit.
+    uint64_t memory_bytes; ///< Gather: layers are baked in groups so that the process stays below it. 0 (default): no limit.
+    lx_denoiser denoise;  ///< Gather only. Default LX_DENOISE_BUILTIN.
     bool combined;        ///< One layer with all sources at their authored colours. Default false.
     uint32_t max_layers;  ///< More sources are grouped by material, then by parent node. Default 64.
     bool direct_only;     ///< Leave out what bounces.
@@ -99,6 +117,10 @@ typedef struct lx_bake_summary {
     float texels_per_m;
     float coverage;        ///< Covered share of all pages.
     uint64_t path_count, ray_count; ///< Rays of both kinds that were traced.
+    float noise;           ///< Estimated relative standard error of the sum at authored colours before denoising, root mean square over valid texels (each over
+                           ///< max(texel, 1 % of the mean)). 0: unknown (path).
+    uint32_t group_count;  ///< Groups of layers that were baked one after the other.
+    uint64_t predicted_bytes; ///< Peak memory of the process as predicted before the first ray.
     double seconds;        ///< lx_bake_run.
     lx_stage_seconds stages; ///< Those of saving after lx_bake_save.
     uint64_t pack_bytes;   ///< After lx_bake_save.

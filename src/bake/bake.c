@@ -26,7 +26,9 @@ lx_transport_desc lx_transport_desc_default(void)
 
 lx_bake_desc lx_bake_desc_default(void)
 {
-    return (lx_bake_desc){.transport = lx_transport_desc_default(), .samples = 256, .max_layers = 64};
+    lx_bake_desc desc = {.transport = lx_transport_desc_default(), .integrator = LX_INTEGRATOR_PATH, .samples = 256, .noise = 0.02f, .denoise = LX_DENOISE_BUILTIN,
+                         .max_layers = 64};
+    return desc;
 }
 
 static lx_result check_desc(const lx_bake_desc *desc, lx_error *error)

@@ -1,0 +1,43 @@
+/// Light that reaches luxels straight from one source, by as many shadow rays as its penumbras ask for.
+///
+/// A luxel's sites are all looked at, but few rays tell that a luxel is lit or dark altogether; only where a luxel or one of its neighbours saw both
+/// do all samples get their rays. What a luxel gets depends on its sites, its stream and the source alone (and its neighbours' first rays), never on
+/// other sources or on threads.
+#ifndef LX_TRACE_DIRECT_H
+#define LX_TRACE_DIRECT_H
+
+#include "trace/light_sample.h"
+
+enum { lx_direct_sites = 16 }; ///< Receivers per luxel.
+
+/// The luxels of one tile.
+typedef struct lx_direct_tile {
+    uint32_t count;             ///< At most 32 × 32.
+    const uint16_t *place;      ///< [count] y * 32 + x within the tile, ascending: who is whose neighbour.
+    const uint32_t *chart;      ///< [count] only luxels of one chart are neighbours.
+    const uint32_t *stream;     ///< [count] key of the luxel's random numbers.
+    const lx_receiver *sites;   ///< [count][lx_direct_sites]
+} lx_direct_tile;
+
+typedef struct lx_direct_settings {
+    const lx_tracer *tracer;
+    uint32_t samples;           ///< At most so many shadow rays a luxel and source (times the cells' share for monitors), a multiple of lx_direct_sites.
+} lx_direct_settings;
+
+/// Working memory of one worker.
+typedef struct lx_direct_batch lx_direct_batch;
+lx_direct_batch *lx_direct_batch_create(void);
+void lx_direct_batch_destroy(lx_direct_batch *batch);
+uint64_t lx_direct_batch_rays(const lx_direct_batch *batch);
+
+/// Irradiance of source `source` at unit strength: mean over the sites, with the variance of that mean. The share of emissive surfaces and
+/// pictures of skies that cosine-weighted rays find better is left out: samples are weighed as `lx_sample_source(count = lx_direct_sample_weight)` says, hits have
+/// lx_hit_weight with the same count. `mean`: [cell][luxel of the tile] rgb; `variance`: [cell][luxel], of the mean of the channels.
+/// False: nothing arrives anywhere in the tile, nothing was written.
+bool lx_direct_light(lx_direct_batch *batch, const lx_direct_settings *settings, const lx_direct_tile *tile, uint32_t source, lx_rgb *mean,
+                     float *variance);
+
+/// The `count` that weighs samples of a source against one cosine-weighted ray: 1 but for monitors. A matter of the source alone.
+uint32_t lx_direct_sample_weight(const lx_tracer *tracer, uint32_t source);
+
+#endif
