@@ -11,10 +11,11 @@
 #include <string.h>
 
 enum {
-    first_looks = 4,     // rays that tell most places that lie in the open,
+    first_looks = 4,     // rays that tell most places, in the open or inside,
     all_looks = 16,      // and those that decide for the rest:
     most_backs = 4,      // of all_looks. More: the place is inside something
     enough_sites = 4,    // good ones that lie where they fell: no need to move others
+    most_failures = 3,   // to move a site: the others would not fare better
     most_pieces = 6,     // texels of more triangles are looked at site by site
     direction_count = 8, // of moves; diagonals reach the inner corner of a room from under it
     most_crossings = 8,  // along one of them
@@ -68,8 +69,11 @@ static uint32_t count_backs(const lx_tracer *tracer, const lx_receiver *r, uint3
 static bool is_good(const company *c, const lx_receiver *r, uint32_t site)
 {
     const uint32_t stream = lx_hash_combine(c->stream, 0x51e30000u + site);
-    const uint32_t backs = count_backs(c->tracer, r, stream, 0, first_looks);
-    return backs == 0 || backs + count_backs(c->tracer, r, stream, first_looks, all_looks) <= most_backs;
+    uint32_t backs = count_backs(c->tracer, r, stream, 0, first_looks / 2);
+    if (backs == first_looks / 2) return false;
+    backs += count_backs(c->tracer, r, stream, first_looks / 2, first_looks);
+    if (backs == 0) return true;
+    return backs + count_backs(c->tracer, r, stream, first_looks, all_looks) <= most_backs;
 }
 
 // One look from each site. True if none of them sees a back: then all are good.
@@ -277,8 +281,13 @@ static uint32_t choose_sites(company *c)
     }
     for (uint32_t k = 0; k < lx_site_count; ++k)
         if (is_good(c, &c->sites[k], k)) c->good |= 1u << k;
-    for (uint32_t k = 0; k < lx_site_count && bit_count(c->good & ~c->moved) < enough_sites; ++k) {
-        if (c->good >> k & 1 || !move_out(c, k, &c->sites[k])) continue;
+    uint32_t failures = 0;
+    for (uint32_t k = 0; k < lx_site_count && failures < most_failures && bit_count(c->good) < enough_sites; ++k) {
+        if (c->good >> k & 1) continue;
+        if (!move_out(c, k, &c->sites[k])) {
+            ++failures;
+            continue;
+        }
         c->good |= 1u << k;
         c->moved |= 1u << k;
     }
