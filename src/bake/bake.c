@@ -14,8 +14,7 @@
 #include <string.h>
 
 enum {
-    tile_edge = 32,     // texels; the same blocks the pack is stored in
-    most_sites = 16,    // places per texel; more would cost rays for push-off without telling more
+    tile_edge = lx_site_block, // texels; the same blocks the pack is stored in
     most_samples = 1 << 24,
 };
 
@@ -118,8 +117,7 @@ void lx_bake_get_summary(const lx_bake *bake, lx_bake_summary *out)
 typedef struct tile_scratch {
     lx_path_batch *batch;
     double *sums;         // [texel of the tile][layer][channel]
-    lx_receiver *sites;   // [texel of the tile][most_sites]
-    uint32_t back_hits[tile_edge * tile_edge];
+    lx_receiver *sites;   // [texel of the tile][lx_site_count]
     uint32_t texels[tile_edge * tile_edge]; // on the page
     lx_path_start starts[lx_path_batch_size];
 } tile_scratch;
@@ -135,16 +133,10 @@ typedef struct bake_job {
     luxel_tile *tiles;
     size_t tile_count;
     tile_scratch *scratch; // [worker]
-    uint8_t *invalid;      // [page][texel]
     lx_path_settings settings;
     uint32_t site_count;
     lx_stage_seconds stages;
 } bake_job;
-
-static uint32_t texel_stream(const bake_job *job, uint32_t page, uint32_t texel)
-{
-    return lx_stream_key(job->bake->desc.transport.seed, page, texel);
-}
 
 static uint32_t collect_texels(const bake_job *job, const luxel_tile *tile, tile_scratch *s)
 {
@@ -159,10 +151,8 @@ static uint32_t collect_texels(const bake_job *job, const luxel_tile *tile, tile
 
 static void place_sites(const bake_job *job, const luxel_tile *tile, tile_scratch *s, uint32_t count)
 {
-    const uint32_t size = job->bake->atlas->page_size;
     for (uint32_t i = 0; i < count; ++i)
-        lx_luxel_sites(job->bake, &job->pages[tile->page], s->texels[i] % size, s->texels[i] / size,
-                       texel_stream(job, tile->page, s->texels[i]), job->site_count, s->sites + (size_t)i * most_sites);
+        lx_luxel_sites(job->bake, &job->pages[tile->page], s->texels[i], 0, job->site_count, s->sites + (size_t)i * lx_site_count);
 }
 
 // Texel by texel, so that the paths of a batch start close together. A site keeps a run of consecutive samples, which is
@@ -170,27 +160,28 @@ static void place_sites(const bake_job *job, const luxel_tile *tile, tile_scratc
 static void trace_texels(const bake_job *job, const luxel_tile *tile, tile_scratch *s, uint32_t count)
 {
     const uint32_t samples = job->bake->desc.samples;
+    const lx_luxel_page *page = &job->pages[tile->page];
     size_t filled = 0;
     for (uint32_t i = 0; i < count; ++i) {
-        const uint32_t stream = texel_stream(job, tile->page, s->texels[i]);
+        if (!lx_luxel_is_valid(page, s->texels[i])) continue;
+        const uint32_t stream = lx_luxel_stream(job->bake, page, s->texels[i]);
         for (uint32_t sample = 0; sample < samples; ++sample) {
             const uint32_t site = (uint32_t)((uint64_t)sample * job->site_count / samples);
-            s->starts[filled++] = (lx_path_start){.receiver = s->sites[(size_t)i * most_sites + site], .weight = {1, 1, 1},
+            s->starts[filled++] = (lx_path_start){.receiver = s->sites[(size_t)i * lx_site_count + site], .weight = {1, 1, 1},
                                                   .stream = stream, .sample = sample, .target = i};
             if (filled == lx_path_batch_size) {
                 if (lx_pool_is_stopping(job->bake->scene->context->pool)) return;
-                lx_path_trace(s->batch, &job->settings, s->starts, filled, s->sums, s->back_hits);
+                lx_path_trace(s->batch, &job->settings, s->starts, filled, s->sums, NULL);
                 filled = 0;
             }
         }
     }
-    lx_path_trace(s->batch, &job->settings, s->starts, filled, s->sums, s->back_hits);
+    lx_path_trace(s->batch, &job->settings, s->starts, filled, s->sums, NULL);
 }
 
 static void store_texels(const bake_job *job, const luxel_tile *tile, const tile_scratch *s, uint32_t count)
 {
     const lx_bake *bake = job->bake;
-    const size_t page_texels = (size_t)bake->atlas->page_size * bake->atlas->page_size;
     const double scale = 1.0 / bake->desc.samples;
     for (uint32_t layer = 0; layer < bake->layer_count; ++layer) {
         float *image = lx_bake_image(bake, tile->page, layer);
@@ -199,9 +190,6 @@ static void store_texels(const bake_job *job, const luxel_tile *tile, const tile
             for (int c = 0; c < 3; ++c) image[3 * (size_t)s->texels[i] + (size_t)c] = (float)(sum[c] * scale);
         }
     }
-    // A place that sees the black side of closed surfaces in more than a quarter of all directions is inside something.
-    for (uint32_t i = 0; i < count; ++i)
-        job->invalid[tile->page * page_texels + s->texels[i]] = s->back_hits[i] > bake->desc.samples / 4;
 }
 
 static lx_result bake_tile(void *user, size_t task, uint32_t worker, lx_error *error)
@@ -212,7 +200,6 @@ static lx_result bake_tile(void *user, size_t task, uint32_t worker, lx_error *e
     tile_scratch *s = &job->scratch[worker];
     const uint32_t count = collect_texels(job, tile, s);
     memset(s->sums, 0, sizeof(double) * 3 * count * job->bake->layer_count);
-    memset(s->back_hits, 0, sizeof s->back_hits);
     place_sites(job, tile, s, count);
     trace_texels(job, tile, s, count);
     store_texels(job, tile, s, count);
@@ -226,6 +213,14 @@ static lx_result rasterise_page(void *user, size_t page, uint32_t worker, lx_err
     (void)worker;
     bake_job *job = user;
     return lx_luxels_rasterise(job->bake, (uint32_t)page, &job->pages[page], error);
+}
+
+static lx_result settle_tile(void *user, size_t task, uint32_t worker, lx_error *error)
+{
+    (void)worker;
+    bake_job *job = user;
+    const luxel_tile *tile = &job->tiles[task];
+    return lx_luxels_settle(job->bake, &job->pages[tile->page], tile->x, tile->y, error);
 }
 
 static lx_result list_tiles(bake_job *job, lx_error *error)
@@ -252,7 +247,7 @@ static lx_result create_scratch(bake_job *job, uint32_t workers, lx_error *error
         tile_scratch *s = &job->scratch[i];
         s->batch = lx_path_batch_create();
         s->sums = lx_calloc_array((size_t)tile_edge * tile_edge * job->bake->layer_count * 3, sizeof *s->sums);
-        s->sites = lx_calloc_array((size_t)tile_edge * tile_edge * most_sites, sizeof *s->sites);
+        s->sites = lx_calloc_array((size_t)tile_edge * tile_edge * lx_site_count, sizeof *s->sites);
         if (!s->batch || !s->sums || !s->sites) return lx_fail_memory(error, "workers");
     }
     return LX_OK;
@@ -269,7 +264,6 @@ static void release_job(bake_job *job, uint32_t workers)
     lx_free(job->scratch);
     lx_free(job->pages);
     lx_free(job->tiles);
-    lx_free(job->invalid);
 }
 
 // Fills padding and invalid texels of one page in all layers.
@@ -287,8 +281,8 @@ static lx_result fill_page(void *user, size_t page, uint32_t worker, lx_error *e
         result = lx_fail_memory(error, "dilation");
         goto cleanup;
     }
-    const uint8_t *coverage = bake->texel_coverage + page * texel_count, *invalid = job->invalid + page * texel_count;
-    for (size_t i = 0; i < texel_count; ++i) valid[i] = coverage[i] && !invalid[i];
+    const uint8_t *coverage = bake->texel_coverage + page * texel_count;
+    for (size_t i = 0; i < texel_count; ++i) valid[i] = coverage[i] && lx_luxel_is_valid(&job->pages[page], (uint32_t)i);
     LX_TRY(lx_dilate_map(size, bake->atlas->padding, bake->texel_chart + page * texel_count, valid, source, error));
     for (uint32_t layer = 0; layer < bake->layer_count; ++layer)
         lx_dilate_apply(size, source, lx_bake_image(bake, (uint32_t)page, layer));
@@ -309,14 +303,14 @@ static double lap(double *start)
 static void summarise(bake_job *job, uint32_t workers, double start)
 {
     lx_bake *bake = job->bake;
-    const size_t total = (size_t)bake->atlas->page_size * bake->atlas->page_size * bake->atlas->page_count;
+    const size_t page_texels = (size_t)bake->atlas->page_size * bake->atlas->page_size, total = page_texels * bake->atlas->page_count;
     lx_bake_summary *s = &bake->summary;
     *s = (lx_bake_summary){.page_count = bake->atlas->page_count, .page_size = bake->atlas->page_size,
                            .layer_count = bake->layer_count, .source_count = bake->source_count,
                            .texels_per_m = bake->atlas->texels_per_m, .stages = job->stages};
     for (size_t i = 0; i < total; ++i) {
         s->texel_count += bake->texel_coverage[i] != 0;
-        s->invalid_count += bake->texel_coverage[i] && job->invalid[i];
+        s->invalid_count += bake->texel_coverage[i] && !lx_luxel_is_valid(&job->pages[i / page_texels], (uint32_t)(i % page_texels));
     }
     s->coverage = (float)((double)s->texel_count / (double)total);
     s->path_count = s->texel_count * bake->desc.samples;
@@ -337,9 +331,7 @@ static void check_sum_of_layers(const bake_job *job)
         tile_scratch *s = &job->scratch[0];
         const uint32_t texels = collect_texels(job, tile, s), count = texels < points_per_page ? texels : points_per_page;
         for (uint32_t k = 0; k < count; ++k) {
-            const uint32_t texel = s->texels[k * texels / count], size = job->bake->atlas->page_size;
-            lx_luxel_sites(job->bake, &job->pages[tile->page], texel % size, texel / size, texel_stream(job, tile->page, texel), 1,
-                           &points[k]);
+            lx_luxel_sites(job->bake, &job->pages[tile->page], s->texels[k * texels / count], 0, 1, &points[k]);
         }
         lx_layers_check(job->bake, s->batch, points, count);
     }
@@ -354,13 +346,12 @@ lx_result lx_bake_run(lx_bake *bake, const lx_progress_sink *progress, lx_error 
     lx_pool *pool = bake->scene->context->pool;
     const uint32_t workers = lx_pool_worker_count(pool), samples = bake->desc.samples;
     float *weights = NULL;
-    bake_job job = {.bake = bake, .stages = {.import = bake->scene->import_seconds, .unwrap = atlas->seconds}, .site_count = samples < most_sites ? samples : (uint32_t)most_sites};
+    bake_job job = {.bake = bake, .stages = {.import = bake->scene->import_seconds, .unwrap = atlas->seconds}, .site_count = samples < lx_site_count ? samples : (uint32_t)lx_site_count};
     job.settings = (lx_path_settings){.tracer = bake->tracer, .uses = bake->uses, .layer_count = bake->layer_count,
                                       .bounces = bake->desc.direct_only ? 0 : bake->desc.transport.bounces,
                                       .direct = !bake->desc.indirect_only, .indirect = !bake->desc.direct_only};
     job.pages = lx_calloc_array(atlas->page_count, sizeof *job.pages);
-    job.invalid = lx_calloc_array((size_t)atlas->page_size * atlas->page_size * atlas->page_count, 1);
-    if (!job.pages || !job.invalid) {
+    if (!job.pages) {
         result = lx_fail_memory(error, "luxels");
         goto cleanup;
     }
@@ -374,6 +365,7 @@ lx_result lx_bake_run(lx_bake *bake, const lx_progress_sink *progress, lx_error 
         goto cleanup;
     }
     for (size_t i = 0; i < job.tile_count; ++i) weights[i] = job.tiles[i].texel_count;
+    LX_TRY(lx_pool_run_weighted(pool, job.tile_count, weights, settle_tile, &job, "luxels", progress, error));
     job.stages.luxels = lap(&stage_start);
     LX_TRY(lx_pool_run_weighted(pool, job.tile_count, weights, bake_tile, &job, "bake", progress, error));
     job.stages.bake = lap(&stage_start);

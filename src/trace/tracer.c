@@ -174,7 +174,8 @@ static lx_result build_accel(lx_tracer *tracer, lx_error *error)
         meshes[i] = (lx_accel_mesh){.vertices = tracer->surfaces[i].positions, .indices = primitive->indices,
                                     .vertex_count = primitive->vertex_count, .triangle_count = primitive->triangle_count,
                                     .has_holes = tracer->surfaces[i].kind == LX_SURFACE_CUTOUT,
-                                    .transmits = tracer->surfaces[i].kind == LX_SURFACE_TRANSLUCENT};
+                                    .transmits = tracer->surfaces[i].kind == LX_SURFACE_TRANSLUCENT,
+                                    .front = lx_surface_is_solid(tracer, i) ? tracer->surfaces[i].orientation : 0};
     }
     const lx_accel_surface_queries queries = {tracer, is_hole, transmittance_at};
     const lx_result result =
@@ -405,6 +406,11 @@ void lx_trace_transmittance(const lx_tracer *tracer, const lx_ray *rays, lx_rgb 
     lx_accel_transmittance(tracer->accel, rays, transmittance, count);
 }
 
+bool lx_trace_crowded(const lx_tracer *tracer, const lx_patch *patches, size_t count)
+{
+    return lx_accel_crowded(tracer->accel, patches, count);
+}
+
 static float offset_component(float position, float normal)
 {
     static const float origin = 1.0f / 32, float_scale = 1.0f / 65536, int_scale = 256;
@@ -483,6 +489,11 @@ lx_vec3 lx_normal_at(const lx_tracer *tracer, uint32_t surface, uint32_t triangl
 bool lx_surface_is_double_sided(const lx_tracer *tracer, uint32_t surface)
 {
     return material_of(tracer, surface)->double_sided;
+}
+
+bool lx_surface_is_solid(const lx_tracer *tracer, uint32_t surface)
+{
+    return tracer->surfaces[surface].kind == LX_SURFACE_OPAQUE && !lx_surface_is_double_sided(tracer, surface);
 }
 
 static lx_shading shade(const lx_tracer *tracer, lx_vec3 direction, uint32_t surface, uint32_t triangle, float u, float v)
