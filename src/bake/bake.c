@@ -14,7 +14,7 @@
 #include <string.h>
 
 enum {
-    tile_edge = 32,     // texels; the same blocks the pack is stored in
+    tile_luxels = lx_luxel_tile_edge * lx_luxel_tile_edge,
     most_sites = 16,    // places per texel; more would cost rays for push-off without telling more
     most_samples = 1 << 24,
 };
@@ -60,6 +60,19 @@ static lx_result create_tracer(lx_bake *bake, lx_error *error)
     return result;
 }
 
+// From what is rasterised so far.
+static lx_result number_luxels(lx_bake *bake, lx_error *error)
+{
+    lx_result result = LX_OK;
+    lx_finished_destroy(bake->finished);
+    bake->finished = NULL;
+    lx_bake_map_release(&bake->map);
+    LX_TRY(lx_bake_map_build(bake->atlas->page_size, bake->atlas->page_count, bake->texel_chart, bake->texel_coverage, &bake->map, error));
+    LX_TRY(lx_finished_create(&bake->map, bake->layer_count, false, NULL, &bake->finished, error));
+cleanup:
+    return result;
+}
+
 lx_result lx_bake_create(const lx_scene *scene, const lx_atlas *atlas, const lx_bake_desc *desc, lx_bake **out_bake,
                          lx_error *error)
 {
@@ -73,21 +86,19 @@ lx_result lx_bake_create(const lx_scene *scene, const lx_atlas *atlas, const lx_
     LX_TRY(create_tracer(bake, error));
     LX_TRY(lx_layers_build(bake, error));
     LX_TRY(lx_animations_build(bake, error));
-    size_t texel_count, value_count;
-    if (!lx_mul_size((size_t)atlas->page_size * atlas->page_size, atlas->page_count, &texel_count) ||
-        !lx_mul_size(texel_count * 3, bake->layer_count, &value_count)) {
-        result = lx_fail(error, LX_ERROR_LIMIT, "%u pages of %u layers are too many", atlas->page_count, bake->layer_count);
+    size_t texel_count;
+    if (!lx_mul_size((size_t)atlas->page_size * atlas->page_size, atlas->page_count, &texel_count)) {
+        result = lx_fail(error, LX_ERROR_LIMIT, "%u pages are too many", atlas->page_count);
         goto cleanup;
     }
-    bake->texels = lx_calloc_array(value_count, sizeof *bake->texels);
     bake->texel_chart = lx_malloc_array(texel_count, sizeof *bake->texel_chart);
     bake->texel_coverage = lx_calloc_array(texel_count, sizeof *bake->texel_coverage);
-    if (!bake->texels || !bake->texel_chart || !bake->texel_coverage) {
-        result = lx_fail(error, LX_ERROR_OUT_OF_MEMORY, "out of memory: %u layers of %u pages need %.1f GiB; fewer layers or pages do",
-                         bake->layer_count, atlas->page_count, (double)value_count * sizeof(float) / (1u << 30));
+    if (!bake->texel_chart || !bake->texel_coverage) {
+        result = lx_fail_memory(error, "texels");
         goto cleanup;
     }
     memset(bake->texel_chart, 0xff, texel_count * sizeof *bake->texel_chart); // LX_NO_CHART
+    LX_TRY(number_luxels(bake, error)); // none yet: a bake that never ran is black
     *out_bake = bake;
     bake = NULL;
 cleanup:
@@ -101,7 +112,8 @@ void lx_bake_destroy(lx_bake *bake)
     lx_animations_release(bake);
     lx_layers_release(bake);
     lx_tracer_destroy(bake->tracer);
-    lx_free(bake->texels);
+    lx_finished_destroy(bake->finished);
+    lx_bake_map_release(&bake->map);
     lx_free(bake->texel_chart);
     lx_free(bake->texel_coverage);
     lx_free(bake);
@@ -114,65 +126,50 @@ void lx_bake_get_summary(const lx_bake *bake, lx_bake_summary *out)
 
 // ---- tiles ------------------------------------------------------------------------------------------------------------------
 
-// Working memory of one worker. A tile has at most tile_edge² texels.
+// Working memory of one worker.
 typedef struct tile_scratch {
     lx_path_batch *batch;
-    double *sums;         // [texel of the tile][layer][channel]
-    lx_receiver *sites;   // [texel of the tile][most_sites]
-    uint32_t back_hits[tile_edge * tile_edge];
-    uint32_t texels[tile_edge * tile_edge]; // on the page
+    double *sums;         // [luxel of the tile][layer][channel]
+    lx_receiver *sites;   // [luxel of the tile][most_sites]
+    uint32_t back_hits[tile_luxels];
+    lx_rgb layer[tile_luxels]; // one layer on its way out
     lx_path_start starts[lx_path_batch_size];
 } tile_scratch;
-
-typedef struct luxel_tile {
-    uint32_t page, x, y;
-    float texel_count;
-} luxel_tile;
 
 typedef struct bake_job {
     lx_bake *bake;
     lx_luxel_page *pages;
-    luxel_tile *tiles;
-    size_t tile_count;
     tile_scratch *scratch; // [worker]
-    uint8_t *invalid;      // [page][texel]
     lx_path_settings settings;
     uint32_t site_count;
     lx_stage_seconds stages;
 } bake_job;
 
-static uint32_t texel_stream(const bake_job *job, uint32_t page, uint32_t texel)
+// On its page.
+static uint32_t texel_of(const lx_luxel_map *map, uint32_t luxel)
 {
-    return lx_stream_key(job->bake->desc.transport.seed, page, texel);
+    return map->texel[luxel] % (map->page_size * map->page_size);
 }
 
-static uint32_t collect_texels(const bake_job *job, const luxel_tile *tile, tile_scratch *s)
+static uint32_t luxel_stream(const bake_job *job, const lx_luxel_tile *tile, uint32_t luxel)
 {
-    const uint32_t size = job->bake->atlas->page_size;
-    const uint8_t *coverage = job->bake->texel_coverage + (size_t)tile->page * size * size;
-    uint32_t count = 0;
-    for (uint32_t y = tile->y; y < tile->y + tile_edge && y < size; ++y)
-        for (uint32_t x = tile->x; x < tile->x + tile_edge && x < size; ++x)
-            if (coverage[(size_t)y * size + x]) s->texels[count++] = y * size + x;
-    return count;
+    return lx_stream_key(job->bake->desc.transport.seed, tile->page, texel_of(&job->bake->map.view, luxel));
 }
 
-static void place_sites(const bake_job *job, const luxel_tile *tile, tile_scratch *s, uint32_t count)
+static void place_sites(const bake_job *job, const lx_luxel_tile *tile, uint32_t luxel, uint32_t count, lx_receiver *out)
 {
-    const uint32_t size = job->bake->atlas->page_size;
-    for (uint32_t i = 0; i < count; ++i)
-        lx_luxel_sites(job->bake, &job->pages[tile->page], s->texels[i] % size, s->texels[i] / size,
-                       texel_stream(job, tile->page, s->texels[i]), job->site_count, s->sites + (size_t)i * most_sites);
+    const lx_luxel_map *map = &job->bake->map.view;
+    lx_luxel_sites(job->bake, &job->pages[tile->page], lx_luxel_x(map, luxel), lx_luxel_y(map, luxel), luxel_stream(job, tile, luxel), count, out);
 }
 
-// Texel by texel, so that the paths of a batch start close together. A site keeps a run of consecutive samples, which is
+// Luxel by luxel, so that the paths of a batch start close together. A site keeps a run of consecutive samples, which is
 // a well-spread set in itself.
-static void trace_texels(const bake_job *job, const luxel_tile *tile, tile_scratch *s, uint32_t count)
+static void trace_luxels(const bake_job *job, const lx_luxel_tile *tile, tile_scratch *s)
 {
     const uint32_t samples = job->bake->desc.samples;
     size_t filled = 0;
-    for (uint32_t i = 0; i < count; ++i) {
-        const uint32_t stream = texel_stream(job, tile->page, s->texels[i]);
+    for (uint32_t i = 0; i < tile->count; ++i) {
+        const uint32_t stream = luxel_stream(job, tile, tile->first + i);
         for (uint32_t sample = 0; sample < samples; ++sample) {
             const uint32_t site = (uint32_t)((uint64_t)sample * job->site_count / samples);
             s->starts[filled++] = (lx_path_start){.receiver = s->sites[(size_t)i * most_sites + site], .weight = {1, 1, 1},
@@ -187,36 +184,33 @@ static void trace_texels(const bake_job *job, const luxel_tile *tile, tile_scrat
     lx_path_trace(s->batch, &job->settings, s->starts, filled, s->sums, s->back_hits);
 }
 
-static void store_texels(const bake_job *job, const luxel_tile *tile, const tile_scratch *s, uint32_t count)
+static lx_result store_luxels(const bake_job *job, const lx_luxel_tile *tile, tile_scratch *s, lx_error *error)
 {
-    const lx_bake *bake = job->bake;
-    const size_t page_texels = (size_t)bake->atlas->page_size * bake->atlas->page_size;
+    lx_bake *bake = job->bake;
     const double scale = 1.0 / bake->desc.samples;
     for (uint32_t layer = 0; layer < bake->layer_count; ++layer) {
-        float *image = lx_bake_image(bake, tile->page, layer);
-        for (uint32_t i = 0; i < count; ++i) {
+        for (uint32_t i = 0; i < tile->count; ++i) {
             const double *sum = s->sums + 3 * ((size_t)i * bake->layer_count + layer);
-            for (int c = 0; c < 3; ++c) image[3 * (size_t)s->texels[i] + (size_t)c] = (float)(sum[c] * scale);
+            s->layer[i] = (lx_rgb){(float)(sum[0] * scale), (float)(sum[1] * scale), (float)(sum[2] * scale)};
         }
+        const lx_result result = lx_finished_write(bake->finished, layer, tile->first, tile->count, s->layer, error);
+        if (result != LX_OK) return result;
     }
     // A place that sees the black side of closed surfaces in more than a quarter of all directions is inside something.
-    for (uint32_t i = 0; i < count; ++i)
-        job->invalid[tile->page * page_texels + s->texels[i]] = s->back_hits[i] > bake->desc.samples / 4;
+    for (uint32_t i = 0; i < tile->count; ++i) bake->map.valid[tile->first + i] = s->back_hits[i] <= bake->desc.samples / 4;
+    return LX_OK;
 }
 
 static lx_result bake_tile(void *user, size_t task, uint32_t worker, lx_error *error)
 {
-    (void)error;
     const bake_job *job = user;
-    const luxel_tile *tile = &job->tiles[task];
+    const lx_luxel_tile *tile = &job->bake->map.tiles[task];
     tile_scratch *s = &job->scratch[worker];
-    const uint32_t count = collect_texels(job, tile, s);
-    memset(s->sums, 0, sizeof(double) * 3 * count * job->bake->layer_count);
+    memset(s->sums, 0, sizeof(double) * 3 * tile->count * job->bake->layer_count);
     memset(s->back_hits, 0, sizeof s->back_hits);
-    place_sites(job, tile, s, count);
-    trace_texels(job, tile, s, count);
-    store_texels(job, tile, s, count);
-    return LX_OK;
+    for (uint32_t i = 0; i < tile->count; ++i) place_sites(job, tile, tile->first + i, job->site_count, s->sites + (size_t)i * most_sites);
+    trace_luxels(job, tile, s);
+    return store_luxels(job, tile, s, error);
 }
 
 // ---- stages -----------------------------------------------------------------------------------------------------------------
@@ -228,22 +222,6 @@ static lx_result rasterise_page(void *user, size_t page, uint32_t worker, lx_err
     return lx_luxels_rasterise(job->bake, (uint32_t)page, &job->pages[page], error);
 }
 
-static lx_result list_tiles(bake_job *job, lx_error *error)
-{
-    const lx_bake *bake = job->bake;
-    const uint32_t size = bake->atlas->page_size, edge = (size + tile_edge - 1) / tile_edge;
-    job->tiles = lx_calloc_array((size_t)edge * edge * bake->atlas->page_count, sizeof *job->tiles);
-    if (!job->tiles) return lx_fail_memory(error, "tiles");
-    for (uint32_t page = 0; page < bake->atlas->page_count; ++page)
-        for (uint32_t y = 0; y < size; y += tile_edge)
-            for (uint32_t x = 0; x < size; x += tile_edge) {
-                luxel_tile t = {.page = page, .x = x, .y = y};
-                t.texel_count = (float)collect_texels(job, &t, &job->scratch[0]);
-                if (t.texel_count > 0) job->tiles[job->tile_count++] = t;
-            }
-    return LX_OK;
-}
-
 static lx_result create_scratch(bake_job *job, uint32_t workers, lx_error *error)
 {
     job->scratch = lx_calloc_array(workers, sizeof *job->scratch);
@@ -251,8 +229,8 @@ static lx_result create_scratch(bake_job *job, uint32_t workers, lx_error *error
     for (uint32_t i = 0; i < workers; ++i) {
         tile_scratch *s = &job->scratch[i];
         s->batch = lx_path_batch_create();
-        s->sums = lx_calloc_array((size_t)tile_edge * tile_edge * job->bake->layer_count * 3, sizeof *s->sums);
-        s->sites = lx_calloc_array((size_t)tile_edge * tile_edge * most_sites, sizeof *s->sites);
+        s->sums = lx_calloc_array((size_t)tile_luxels * job->bake->layer_count * 3, sizeof *s->sums);
+        s->sites = lx_calloc_array((size_t)tile_luxels * most_sites, sizeof *s->sites);
         if (!s->batch || !s->sums || !s->sites) return lx_fail_memory(error, "workers");
     }
     return LX_OK;
@@ -268,34 +246,15 @@ static void release_job(bake_job *job, uint32_t workers)
     for (uint32_t i = 0; job->pages && i < job->bake->atlas->page_count; ++i) lx_luxels_release(&job->pages[i]);
     lx_free(job->scratch);
     lx_free(job->pages);
-    lx_free(job->tiles);
-    lx_free(job->invalid);
 }
 
 // Fills padding and invalid texels of one page in all layers.
 static lx_result fill_page(void *user, size_t page, uint32_t worker, lx_error *error)
 {
     (void)worker;
-    bake_job *job = user;
-    lx_bake *bake = job->bake;
-    const uint32_t size = bake->atlas->page_size;
-    const size_t texel_count = (size_t)size * size;
-    uint32_t *source = lx_malloc_array(texel_count, sizeof *source);
-    uint8_t *valid = lx_malloc_array(texel_count, 1);
-    lx_result result = LX_OK;
-    if (!source || !valid) {
-        result = lx_fail_memory(error, "dilation");
-        goto cleanup;
-    }
-    const uint8_t *coverage = bake->texel_coverage + page * texel_count, *invalid = job->invalid + page * texel_count;
-    for (size_t i = 0; i < texel_count; ++i) valid[i] = coverage[i] && !invalid[i];
-    LX_TRY(lx_dilate_map(size, bake->atlas->padding, bake->texel_chart + page * texel_count, valid, source, error));
-    for (uint32_t layer = 0; layer < bake->layer_count; ++layer)
-        lx_dilate_apply(size, source, lx_bake_image(bake, (uint32_t)page, layer));
-cleanup:
-    lx_free(source);
-    lx_free(valid);
-    return result;
+    const lx_bake *bake = ((bake_job *)user)->bake;
+    const size_t texel_count = (size_t)bake->atlas->page_size * bake->atlas->page_size;
+    return lx_finished_dilate(bake->finished, (uint32_t)page, bake->atlas->padding, bake->texel_chart + page * texel_count, error);
 }
 
 // Seconds since *start, which becomes now.
@@ -314,10 +273,8 @@ static void summarise(bake_job *job, uint32_t workers, double start)
     *s = (lx_bake_summary){.page_count = bake->atlas->page_count, .page_size = bake->atlas->page_size,
                            .layer_count = bake->layer_count, .source_count = bake->source_count,
                            .texels_per_m = bake->atlas->texels_per_m, .stages = job->stages};
-    for (size_t i = 0; i < total; ++i) {
-        s->texel_count += bake->texel_coverage[i] != 0;
-        s->invalid_count += bake->texel_coverage[i] && job->invalid[i];
-    }
+    s->texel_count = bake->map.view.count;
+    for (uint32_t i = 0; i < bake->map.view.count; ++i) s->invalid_count += !bake->map.valid[i];
     s->coverage = (float)((double)s->texel_count / (double)total);
     s->path_count = s->texel_count * bake->desc.samples;
     for (uint32_t i = 0; i < workers; ++i) s->ray_count += lx_path_batch_rays(job->scratch[i].batch);
@@ -330,18 +287,13 @@ static void check_sum_of_layers(const bake_job *job)
     enum { points_per_page = 16 };
     lx_receiver points[points_per_page];
     uint32_t last_page = UINT32_MAX;
-    for (size_t i = 0; i < job->tile_count && !job->bake->desc.combined; ++i) {
-        const luxel_tile *tile = &job->tiles[i];
+    for (uint32_t i = 0; i < job->bake->map.tile_count && !job->bake->desc.combined; ++i) {
+        const lx_luxel_tile *tile = &job->bake->map.tiles[i];
         if (tile->page == last_page) continue;
         last_page = tile->page;
-        tile_scratch *s = &job->scratch[0];
-        const uint32_t texels = collect_texels(job, tile, s), count = texels < points_per_page ? texels : points_per_page;
-        for (uint32_t k = 0; k < count; ++k) {
-            const uint32_t texel = s->texels[k * texels / count], size = job->bake->atlas->page_size;
-            lx_luxel_sites(job->bake, &job->pages[tile->page], texel % size, texel / size, texel_stream(job, tile->page, texel), 1,
-                           &points[k]);
-        }
-        lx_layers_check(job->bake, s->batch, points, count);
+        const uint32_t count = tile->count < points_per_page ? tile->count : points_per_page;
+        for (uint32_t k = 0; k < count; ++k) place_sites(job, tile, tile->first + k * tile->count / count, 1, &points[k]);
+        lx_layers_check(job->bake, job->scratch[0].batch, points, count);
     }
 }
 
@@ -359,29 +311,28 @@ lx_result lx_bake_run(lx_bake *bake, const lx_progress_sink *progress, lx_error 
                                       .bounces = bake->desc.direct_only ? 0 : bake->desc.transport.bounces,
                                       .direct = !bake->desc.indirect_only, .indirect = !bake->desc.direct_only};
     job.pages = lx_calloc_array(atlas->page_count, sizeof *job.pages);
-    job.invalid = lx_calloc_array((size_t)atlas->page_size * atlas->page_size * atlas->page_count, 1);
-    if (!job.pages || !job.invalid) {
+    if (!job.pages) {
         result = lx_fail_memory(error, "luxels");
         goto cleanup;
     }
     LX_TRY(create_scratch(&job, workers, error));
     lx_advise_on_scene(bake);
     LX_TRY(lx_pool_run(pool, atlas->page_count, rasterise_page, &job, "luxels", progress, error));
-    LX_TRY(list_tiles(&job, error));
-    weights = lx_malloc_array(job.tile_count, sizeof *weights);
+    LX_TRY(number_luxels(bake, error));
+    weights = lx_malloc_array(bake->map.tile_count, sizeof *weights);
     if (!weights) {
         result = lx_fail_memory(error, "tiles");
         goto cleanup;
     }
-    for (size_t i = 0; i < job.tile_count; ++i) weights[i] = job.tiles[i].texel_count;
+    for (uint32_t i = 0; i < bake->map.tile_count; ++i) weights[i] = (float)bake->map.tiles[i].count;
     job.stages.luxels = lap(&stage_start);
-    LX_TRY(lx_pool_run_weighted(pool, job.tile_count, weights, bake_tile, &job, "bake", progress, error));
+    LX_TRY(lx_pool_run_weighted(pool, bake->map.tile_count, weights, bake_tile, &job, "bake", progress, error));
     job.stages.bake = lap(&stage_start);
     LX_TRY(lx_pool_run(pool, atlas->page_count, fill_page, &job, "post", progress, error));
     job.stages.post = lap(&stage_start);
     summarise(&job, workers, start);
     check_sum_of_layers(&job);
-    lx_advise_on_layers(bake);
+    LX_TRY(lx_advise_on_layers(bake, error));
 cleanup:
     release_job(&job, workers);
     lx_free(weights);
