@@ -1,23 +1,17 @@
-// The bake: luxels, paths, averages, padding. Tiles of luxels are the unit of work; what a tile computes depends on nothing but its place
-// and the settings, so any number of threads gives the same bits.
+// The bake: luxels, their light by one integrator or the other, padding. Tiles of luxels are the unit of work; what a tile computes depends on
+// nothing but its place and the settings, so any number of threads gives the same bits.
 #include "bake/bake.h"
 
 #include "bake/advice.h"
 #include "bake/animations.h"
+#include "bake/bake_job.h"
 #include "bake/layers.h"
-#include "bake/luxels.h"
 #include "base/clock.h"
 #include "base/error.h"
-#include "math/hash.h"
-#include "post/dilate.h"
 
 #include <string.h>
 
-enum {
-    tile_luxels = lx_luxel_tile_edge * lx_luxel_tile_edge,
-    most_sites = 16,    // places per texel; more would cost rays for push-off without telling more
-    most_samples = 1 << 24,
-};
+enum { most_samples = 1 << 24 };
 
 lx_transport_desc lx_transport_desc_default(void)
 {
@@ -29,6 +23,14 @@ lx_bake_desc lx_bake_desc_default(void)
     lx_bake_desc desc = {.transport = lx_transport_desc_default(), .integrator = LX_INTEGRATOR_PATH, .samples = 256, .noise = 0.02f, .denoise = LX_DENOISE_BUILTIN,
                          .max_layers = 64};
     return desc;
+}
+
+// Room for all layers of the luxels that `map` knows.
+static lx_result create_finished(lx_bake *bake, const lx_luxel_map *map, lx_error *error)
+{
+    lx_finished_destroy(bake->finished);
+    bake->finished = NULL;
+    return lx_finished_create(map, bake->layer_count, false, NULL, &bake->finished, error);
 }
 
 static lx_result check_desc(const lx_bake_desc *desc, lx_error *error)
@@ -60,19 +62,6 @@ static lx_result create_tracer(lx_bake *bake, lx_error *error)
     return result;
 }
 
-// From what is rasterised so far.
-static lx_result number_luxels(lx_bake *bake, lx_error *error)
-{
-    lx_result result = LX_OK;
-    lx_finished_destroy(bake->finished);
-    bake->finished = NULL;
-    lx_bake_map_release(&bake->map);
-    LX_TRY(lx_bake_map_build(bake->atlas->page_size, bake->atlas->page_count, bake->texel_chart, bake->texel_coverage, &bake->map, error));
-    LX_TRY(lx_finished_create(&bake->map, bake->layer_count, false, NULL, &bake->finished, error));
-cleanup:
-    return result;
-}
-
 lx_result lx_bake_create(const lx_scene *scene, const lx_atlas *atlas, const lx_bake_desc *desc, lx_bake **out_bake,
                          lx_error *error)
 {
@@ -98,7 +87,8 @@ lx_result lx_bake_create(const lx_scene *scene, const lx_atlas *atlas, const lx_
         goto cleanup;
     }
     memset(bake->texel_chart, 0xff, texel_count * sizeof *bake->texel_chart); // LX_NO_CHART
-    LX_TRY(number_luxels(bake, error)); // none yet: a bake that never ran is black
+    const lx_luxel_map none = {.page_size = atlas->page_size, .page_count = atlas->page_count};
+    LX_TRY(create_finished(bake, &none, error)); // a bake that never ran is black
     *out_bake = bake;
     bake = NULL;
 cleanup:
@@ -113,7 +103,6 @@ void lx_bake_destroy(lx_bake *bake)
     lx_layers_release(bake);
     lx_tracer_destroy(bake->tracer);
     lx_finished_destroy(bake->finished);
-    lx_bake_map_release(&bake->map);
     lx_free(bake->texel_chart);
     lx_free(bake->texel_coverage);
     lx_free(bake);
@@ -124,137 +113,69 @@ void lx_bake_get_summary(const lx_bake *bake, lx_bake_summary *out)
     *out = bake->summary;
 }
 
-// ---- tiles ------------------------------------------------------------------------------------------------------------------
-
-// Working memory of one worker.
-typedef struct tile_scratch {
-    lx_path_batch *batch;
-    double *sums;         // [luxel of the tile][layer][channel]
-    lx_receiver *sites;   // [luxel of the tile][most_sites]
-    uint32_t back_hits[tile_luxels];
-    lx_rgb layer[tile_luxels]; // one layer on its way out
-    lx_path_start starts[lx_path_batch_size];
-} tile_scratch;
-
-typedef struct bake_job {
-    lx_bake *bake;
-    lx_luxel_page *pages;
-    tile_scratch *scratch; // [worker]
-    lx_path_settings settings;
-    uint32_t site_count;
-    lx_stage_seconds stages;
-} bake_job;
-
-// On its page.
-static uint32_t texel_of(const lx_luxel_map *map, uint32_t luxel)
-{
-    return map->texel[luxel] % (map->page_size * map->page_size);
-}
-
-static uint32_t luxel_stream(const bake_job *job, const lx_luxel_tile *tile, uint32_t luxel)
-{
-    return lx_stream_key(job->bake->desc.transport.seed, tile->page, texel_of(&job->bake->map.view, luxel));
-}
-
-static void place_sites(const bake_job *job, const lx_luxel_tile *tile, uint32_t luxel, uint32_t count, lx_receiver *out)
-{
-    const lx_luxel_map *map = &job->bake->map.view;
-    lx_luxel_sites(job->bake, &job->pages[tile->page], lx_luxel_x(map, luxel), lx_luxel_y(map, luxel), luxel_stream(job, tile, luxel), count, out);
-}
-
-// Luxel by luxel, so that the paths of a batch start close together. A site keeps a run of consecutive samples, which is
-// a well-spread set in itself.
-static void trace_luxels(const bake_job *job, const lx_luxel_tile *tile, tile_scratch *s)
-{
-    const uint32_t samples = job->bake->desc.samples;
-    size_t filled = 0;
-    for (uint32_t i = 0; i < tile->count; ++i) {
-        const uint32_t stream = luxel_stream(job, tile, tile->first + i);
-        for (uint32_t sample = 0; sample < samples; ++sample) {
-            const uint32_t site = (uint32_t)((uint64_t)sample * job->site_count / samples);
-            s->starts[filled++] = (lx_path_start){.receiver = s->sites[(size_t)i * most_sites + site], .weight = {1, 1, 1},
-                                                  .stream = stream, .sample = sample, .target = i};
-            if (filled == lx_path_batch_size) {
-                if (lx_pool_is_stopping(job->bake->scene->context->pool)) return;
-                lx_path_trace(s->batch, &job->settings, s->starts, filled, s->sums, s->back_hits);
-                filled = 0;
-            }
-        }
-    }
-    lx_path_trace(s->batch, &job->settings, s->starts, filled, s->sums, s->back_hits);
-}
-
-static lx_result store_luxels(const bake_job *job, const lx_luxel_tile *tile, tile_scratch *s, lx_error *error)
-{
-    lx_bake *bake = job->bake;
-    const double scale = 1.0 / bake->desc.samples;
-    for (uint32_t layer = 0; layer < bake->layer_count; ++layer) {
-        for (uint32_t i = 0; i < tile->count; ++i) {
-            const double *sum = s->sums + 3 * ((size_t)i * bake->layer_count + layer);
-            s->layer[i] = (lx_rgb){(float)(sum[0] * scale), (float)(sum[1] * scale), (float)(sum[2] * scale)};
-        }
-        const lx_result result = lx_finished_write(bake->finished, layer, tile->first, tile->count, s->layer, error);
-        if (result != LX_OK) return result;
-    }
-    // A place that sees the black side of closed surfaces in more than a quarter of all directions is inside something.
-    for (uint32_t i = 0; i < tile->count; ++i) bake->map.valid[tile->first + i] = s->back_hits[i] <= bake->desc.samples / 4;
-    return LX_OK;
-}
-
-static lx_result bake_tile(void *user, size_t task, uint32_t worker, lx_error *error)
-{
-    const bake_job *job = user;
-    const lx_luxel_tile *tile = &job->bake->map.tiles[task];
-    tile_scratch *s = &job->scratch[worker];
-    memset(s->sums, 0, sizeof(double) * 3 * tile->count * job->bake->layer_count);
-    memset(s->back_hits, 0, sizeof s->back_hits);
-    for (uint32_t i = 0; i < tile->count; ++i) place_sites(job, tile, tile->first + i, job->site_count, s->sites + (size_t)i * most_sites);
-    trace_luxels(job, tile, s);
-    return store_luxels(job, tile, s, error);
-}
-
 // ---- stages -----------------------------------------------------------------------------------------------------------------
 
 static lx_result rasterise_page(void *user, size_t page, uint32_t worker, lx_error *error)
 {
     (void)worker;
-    bake_job *job = user;
+    lx_bake_job *job = user;
     return lx_luxels_rasterise(job->bake, (uint32_t)page, &job->pages[page], error);
 }
 
-static lx_result create_scratch(bake_job *job, uint32_t workers, lx_error *error)
+// Where the luxels of a tile are, and whether their light will mean anything.
+static lx_result settle_tile(void *user, size_t task, uint32_t worker, lx_error *error)
 {
-    job->scratch = lx_calloc_array(workers, sizeof *job->scratch);
-    if (!job->scratch) return lx_fail_memory(error, "workers");
-    for (uint32_t i = 0; i < workers; ++i) {
-        tile_scratch *s = &job->scratch[i];
-        s->batch = lx_path_batch_create();
-        s->sums = lx_calloc_array((size_t)tile_luxels * job->bake->layer_count * 3, sizeof *s->sums);
-        s->sites = lx_calloc_array((size_t)tile_luxels * most_sites, sizeof *s->sites);
-        if (!s->batch || !s->sums || !s->sites) return lx_fail_memory(error, "workers");
+    (void)worker;
+    lx_bake_job *job = user;
+    const lx_luxel_tile *tile = &job->map.tiles[task];
+    lx_luxel_page *page = &job->pages[tile->page];
+    const lx_result result = lx_luxels_settle(job->bake, page, tile->x, tile->y, error);
+    if (result != LX_OK) return result;
+    for (uint32_t i = tile->first; i < tile->first + tile->count; ++i) {
+        enum { sites = 4 };
+        uint32_t texel;
+        lx_job_page(job, i, &texel);
+        job->map.size_m[i] = lx_luxel_size(job->bake, page, texel);
+        job->map.valid[i] = lx_luxel_is_valid(page, texel);
+        if (!job->map.valid[i]) continue;
+        lx_receiver r[sites];
+        lx_luxel_sites(job->bake, page, texel, 0, sites, r);
+        lx_vec3 position = {0, 0, 0}, normal = {0, 0, 0};
+        for (int k = 0; k < sites; ++k) {
+            position = lx_mad(position, r[k].position, 1.0f / sites);
+            normal = lx_add(normal, r[k].normal);
+        }
+        job->map.position[i] = position;
+        job->map.normal[i] = lx_normalize_or(normal, r[0].geometric_normal);
     }
     return LX_OK;
 }
 
-static void release_job(bake_job *job, uint32_t workers)
+static lx_result place_luxels(lx_bake_job *job, lx_error *error)
 {
-    for (uint32_t i = 0; job->scratch && i < workers; ++i) {
-        lx_path_batch_destroy(job->scratch[i].batch);
-        lx_free(job->scratch[i].sums);
-        lx_free(job->scratch[i].sites);
-    }
-    for (uint32_t i = 0; job->pages && i < job->bake->atlas->page_count; ++i) lx_luxels_release(&job->pages[i]);
-    lx_free(job->scratch);
-    lx_free(job->pages);
+    lx_result result = LX_OK;
+    const lx_bake *bake = job->bake;
+    const lx_atlas *atlas = bake->atlas;
+    lx_pool *pool = bake->scene->context->pool;
+    LX_TRY(lx_pool_run(pool, atlas->page_count, rasterise_page, job, "luxels", job->progress, error));
+    LX_TRY(lx_bake_map_build(atlas->page_size, atlas->page_count, bake->texel_chart, bake->texel_coverage, &job->map, error));
+    LX_TRY(create_finished(job->bake, &job->map.view, error));
+    job->tile_weights = lx_malloc_array(job->map.tile_count, sizeof *job->tile_weights);
+    if (!job->tile_weights) return lx_fail_memory(error, "tiles");
+    for (uint32_t i = 0; i < job->map.tile_count; ++i) job->tile_weights[i] = (float)job->map.tiles[i].count;
+    LX_TRY(lx_pool_run_weighted(pool, job->map.tile_count, job->tile_weights, settle_tile, job, "luxels", job->progress, error));
+cleanup:
+    return result;
 }
 
-// Fills padding and invalid texels of one page in all layers.
+// Where padding and invalid texels of one page take their light from.
 static lx_result fill_page(void *user, size_t page, uint32_t worker, lx_error *error)
 {
     (void)worker;
-    const lx_bake *bake = ((bake_job *)user)->bake;
+    const lx_bake_job *job = user;
+    const lx_bake *bake = job->bake;
     const size_t texel_count = (size_t)bake->atlas->page_size * bake->atlas->page_size;
-    return lx_finished_dilate(bake->finished, (uint32_t)page, bake->atlas->padding, bake->texel_chart + page * texel_count, error);
+    return lx_finished_dilate(bake->finished, &job->map.view, (uint32_t)page, bake->atlas->padding, bake->texel_chart + page * texel_count, error);
 }
 
 // Seconds since *start, which becomes now.
@@ -265,36 +186,55 @@ static double lap(double *start)
     return seconds;
 }
 
-static void summarise(bake_job *job, uint32_t workers, double start)
+static void summarise(const lx_bake_job *job, double start)
 {
     lx_bake *bake = job->bake;
-    const size_t total = (size_t)bake->atlas->page_size * bake->atlas->page_size * bake->atlas->page_count;
+    const lx_luxel_map *map = &job->map.view;
     lx_bake_summary *s = &bake->summary;
     *s = (lx_bake_summary){.page_count = bake->atlas->page_count, .page_size = bake->atlas->page_size,
-                           .layer_count = bake->layer_count, .source_count = bake->source_count,
-                           .texels_per_m = bake->atlas->texels_per_m, .stages = job->stages};
-    s->texel_count = bake->map.view.count;
-    for (uint32_t i = 0; i < bake->map.view.count; ++i) s->invalid_count += !bake->map.valid[i];
-    s->coverage = (float)((double)s->texel_count / (double)total);
+                           .layer_count = bake->layer_count, .source_count = bake->source_count, .texel_count = map->count,
+                           .texels_per_m = bake->atlas->texels_per_m, .stages = job->stages, .ray_count = job->ray_count,
+                           .noise = job->noise, .group_count = job->group_count};
+    for (uint32_t i = 0; i < map->count; ++i) s->invalid_count += !map->valid[i];
+    const double total = (double)map->page_size * map->page_size * map->page_count;
+    s->coverage = total > 0 ? (float)((double)s->texel_count / total) : 0;
     s->path_count = s->texel_count * bake->desc.samples;
-    for (uint32_t i = 0; i < workers; ++i) s->ray_count += lx_path_batch_rays(job->scratch[i].batch);
     s->seconds = lx_seconds() - start;
 }
 
 // A few places of the first tile of each page stand for all.
-static void check_sum_of_layers(const bake_job *job)
+static lx_result check_sum_of_layers(const lx_bake_job *job, lx_error *error)
 {
     enum { points_per_page = 16 };
     lx_receiver points[points_per_page];
+    if (job->bake->desc.combined) return LX_OK;
+    lx_path_batch *batch = lx_path_batch_create();
+    if (!batch) return lx_fail_memory(error, "bake");
     uint32_t last_page = UINT32_MAX;
-    for (uint32_t i = 0; i < job->bake->map.tile_count && !job->bake->desc.combined; ++i) {
-        const lx_luxel_tile *tile = &job->bake->map.tiles[i];
+    for (uint32_t i = 0; i < job->map.tile_count; ++i) {
+        const lx_luxel_tile *tile = &job->map.tiles[i];
         if (tile->page == last_page) continue;
         last_page = tile->page;
-        const uint32_t count = tile->count < points_per_page ? tile->count : points_per_page;
-        for (uint32_t k = 0; k < count; ++k) place_sites(job, tile, tile->first + k * tile->count / count, 1, &points[k]);
-        lx_layers_check(job->bake, job->scratch[0].batch, points, count);
+        const uint32_t wanted = tile->count < points_per_page ? tile->count : points_per_page;
+        uint32_t count = 0;
+        for (uint32_t k = 0; k < wanted; ++k) {
+            const uint32_t luxel = tile->first + k * tile->count / wanted;
+            uint32_t texel;
+            const lx_luxel_page *page = lx_job_page(job, luxel, &texel);
+            if (job->map.valid[luxel]) lx_luxel_sites(job->bake, page, texel, 0, 1, &points[count++]);
+        }
+        lx_layers_check(job->bake, batch, points, count);
     }
+    lx_path_batch_destroy(batch);
+    return LX_OK;
+}
+
+static void release_job(lx_bake_job *job)
+{
+    for (uint32_t i = 0; job->pages && i < job->bake->atlas->page_count; ++i) lx_luxels_release(&job->pages[i]);
+    lx_free(job->pages);
+    lx_bake_map_release(&job->map);
+    lx_free(job->tile_weights);
 }
 
 lx_result lx_bake_run(lx_bake *bake, const lx_progress_sink *progress, lx_error *error)
@@ -304,37 +244,23 @@ lx_result lx_bake_run(lx_bake *bake, const lx_progress_sink *progress, lx_error 
     double stage_start = start;
     const lx_atlas *atlas = bake->atlas;
     lx_pool *pool = bake->scene->context->pool;
-    const uint32_t workers = lx_pool_worker_count(pool), samples = bake->desc.samples;
-    float *weights = NULL;
-    bake_job job = {.bake = bake, .stages = {.import = bake->scene->import_seconds, .unwrap = atlas->seconds}, .site_count = samples < most_sites ? samples : (uint32_t)most_sites};
-    job.settings = (lx_path_settings){.tracer = bake->tracer, .uses = bake->uses, .layer_count = bake->layer_count,
-                                      .bounces = bake->desc.direct_only ? 0 : bake->desc.transport.bounces,
-                                      .direct = !bake->desc.indirect_only, .indirect = !bake->desc.direct_only};
+    lx_bake_job job = {.bake = bake, .progress = progress, .stages = {.import = bake->scene->import_seconds, .unwrap = atlas->seconds}};
     job.pages = lx_calloc_array(atlas->page_count, sizeof *job.pages);
-    if (!job.pages) {
-        result = lx_fail_memory(error, "luxels");
-        goto cleanup;
-    }
-    LX_TRY(create_scratch(&job, workers, error));
+    if (!job.pages) return lx_fail_memory(error, "luxels");
     lx_advise_on_scene(bake);
-    LX_TRY(lx_pool_run(pool, atlas->page_count, rasterise_page, &job, "luxels", progress, error));
-    LX_TRY(number_luxels(bake, error));
-    weights = lx_malloc_array(bake->map.tile_count, sizeof *weights);
-    if (!weights) {
-        result = lx_fail_memory(error, "tiles");
-        goto cleanup;
-    }
-    for (uint32_t i = 0; i < bake->map.tile_count; ++i) weights[i] = (float)bake->map.tiles[i].count;
+    LX_TRY(place_luxels(&job, error));
     job.stages.luxels = lap(&stage_start);
-    LX_TRY(lx_pool_run_weighted(pool, bake->map.tile_count, weights, bake_tile, &job, "bake", progress, error));
+    if (bake->desc.integrator == LX_INTEGRATOR_PATH)
+        LX_TRY(lx_bake_by_paths(&job, error));
+    else
+        LX_TRY(lx_bake_by_gathering(&job, error));
     job.stages.bake = lap(&stage_start);
     LX_TRY(lx_pool_run(pool, atlas->page_count, fill_page, &job, "post", progress, error));
     job.stages.post = lap(&stage_start);
-    summarise(&job, workers, start);
-    check_sum_of_layers(&job);
+    summarise(&job, start);
+    LX_TRY(check_sum_of_layers(&job, error));
     LX_TRY(lx_advise_on_layers(bake, error));
 cleanup:
-    release_job(&job, workers);
-    lx_free(weights);
+    release_job(&job);
     return result;
 }

@@ -39,10 +39,7 @@ struct lx_bake {
     uint32_t *texel_chart;
     /// Share of a texel's square that surfaces cover, 0…255, [page_count][page_size²]; 0: none (padding or empty).
     uint8_t *texel_coverage;
-
-    // From lx_bake_run on:
-    lx_bake_map map;       ///< Its luxels.
-    lx_finished *finished; ///< T of every layer. Unit light: lux per cd, lx or nt (for `combined`: lux).
+    lx_finished *finished; ///< T of every layer, black until lx_bake_run. Unit light: lux per cd, lx or nt (for `combined`: lux).
 
     lx_bake_summary summary;
 };

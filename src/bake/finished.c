@@ -11,9 +11,9 @@
 enum { no_entry = UINT32_MAX }; // black
 
 struct lx_finished {
-    const lx_bake_map *map;
-    uint32_t layer_count;
+    uint32_t page_size, page_count, layer_count;
     uint32_t *entry;        // [page_count][page_size²] whose colour the texel has; no_entry: nobody's
+    uint8_t *shown;         // [luxel_count] valid: others may hold anything
     uint32_t *first_luxel;  // [page_count + 1] luxels of a page are consecutive, so that an image needs a part of its layer only;
     uint32_t *first_extra;  // [page_count + 1] likewise, from luxel_count on
     uint32_t luxel_count, extra_count;
@@ -28,33 +28,34 @@ static lx_result fail_size(lx_error *error, uint32_t count, uint32_t layer_count
                    layer_count, count, (double)count * layer_count * sizeof(lx_rgb) / (1u << 30));
 }
 
-lx_result lx_finished_create(const lx_bake_map *map, uint32_t layer_count, bool on_disk, const char *folder, lx_finished **out, lx_error *error)
+lx_result lx_finished_create(const lx_luxel_map *map, uint32_t layer_count, bool on_disk, const char *folder, lx_finished **out, lx_error *error)
 {
     lx_result result = LX_OK;
-    const lx_luxel_map *view = &map->view;
-    const size_t page_texels = (size_t)view->page_size * view->page_size;
+    const size_t page_texels = (size_t)map->page_size * map->page_size, texel_count = page_texels * map->page_count;
     size_t value_count;
     lx_finished *f = lx_calloc_array(1, sizeof *f);
     if (!f) return lx_fail_memory(error, "layers");
-    f->map = map;
+    f->page_size = map->page_size;
+    f->page_count = map->page_count;
     f->layer_count = layer_count;
-    f->luxel_count = view->count;
-    f->entry = lx_malloc_array(page_texels * view->page_count, sizeof *f->entry);
-    f->first_luxel = lx_calloc_array((size_t)view->page_count + 1, sizeof *f->first_luxel);
-    f->first_extra = lx_calloc_array((size_t)view->page_count + 1, sizeof *f->first_extra);
-    if (!f->entry || !f->first_luxel || !f->first_extra) {
+    f->luxel_count = map->count;
+    f->entry = lx_malloc_array(texel_count, sizeof *f->entry);
+    f->shown = lx_calloc_array(map->count, 1);
+    f->first_luxel = lx_calloc_array((size_t)map->page_count + 1, sizeof *f->first_luxel);
+    f->first_extra = lx_calloc_array((size_t)map->page_count + 1, sizeof *f->first_extra);
+    if (!f->entry || !f->shown || !f->first_luxel || !f->first_extra) {
         result = lx_fail_memory(error, "layers");
         goto cleanup;
     }
-    memset(f->entry, 0xff, page_texels * view->page_count * sizeof *f->entry); // no_entry
-    for (uint32_t t = 0; t < map->tile_count; ++t) f->first_luxel[map->tiles[t].page + 1] += map->tiles[t].count;
-    for (uint32_t page = 0; page < view->page_count; ++page) f->first_luxel[page + 1] += f->first_luxel[page];
+    memset(f->entry, 0xff, texel_count * sizeof *f->entry); // no_entry
+    for (uint32_t i = 0; i < map->count; ++i) ++f->first_luxel[map->texel[i] / page_texels + 1];
+    for (uint32_t page = 0; page < map->page_count; ++page) f->first_luxel[page + 1] += f->first_luxel[page];
     if (on_disk) {
         LX_TRY(lx_scratch_create(folder, &f->scratch, error));
     } else {
-        if (lx_mul_size(view->count, layer_count, &value_count)) f->luxels = lx_malloc_array(value_count, sizeof *f->luxels);
+        if (lx_mul_size(map->count, layer_count, &value_count)) f->luxels = lx_malloc_array(value_count, sizeof *f->luxels);
         if (!f->luxels) {
-            result = fail_size(error, view->count, layer_count);
+            result = fail_size(error, map->count, layer_count);
             goto cleanup;
         }
     }
@@ -70,6 +71,7 @@ void lx_finished_destroy(lx_finished *f)
     if (!f) return;
     lx_scratch_destroy(f->scratch);
     lx_free(f->entry);
+    lx_free(f->shown);
     lx_free(f->first_luxel);
     lx_free(f->first_extra);
     lx_free(f->luxels);
@@ -77,18 +79,18 @@ void lx_finished_destroy(lx_finished *f)
     lx_free(f);
 }
 
-lx_result lx_finished_dilate(lx_finished *f, uint32_t page, uint32_t padding, uint32_t *page_chart, lx_error *error)
+lx_result lx_finished_dilate(lx_finished *f, const lx_luxel_map *map, uint32_t page, uint32_t padding, uint32_t *page_chart, lx_error *error)
 {
     lx_result result = LX_OK;
-    const lx_luxel_map *view = &f->map->view;
-    const size_t texel_count = (size_t)view->page_size * view->page_size;
-    const uint32_t *index = view->index + page * texel_count;
+    const size_t texel_count = (size_t)f->page_size * f->page_size;
+    const uint32_t *index = map->index + page * texel_count;
     uint32_t *entry = f->entry + page * texel_count;
     uint8_t *valid = lx_malloc_array(texel_count, 1);
     if (!valid) return lx_fail_memory(error, "dilation");
-    for (size_t i = 0; i < texel_count; ++i) valid[i] = index[i] != LX_NO_LUXEL && view->valid[index[i]];
-    LX_TRY(lx_dilate_map(view->page_size, padding, page_chart, valid, entry, error));
+    for (size_t i = 0; i < texel_count; ++i) valid[i] = index[i] != LX_NO_LUXEL && map->valid[index[i]];
+    LX_TRY(lx_dilate_map(f->page_size, padding, page_chart, valid, entry, error));
     for (size_t i = 0; i < texel_count; ++i) entry[i] = entry[i] == UINT32_MAX ? (uint32_t)no_entry : index[entry[i]]; // sources are luxels
+    for (uint32_t i = f->first_luxel[page]; i < f->first_luxel[page + 1]; ++i) f->shown[i] = map->valid[i];
 cleanup:
     lx_free(valid);
     return result;
@@ -96,7 +98,7 @@ cleanup:
 
 lx_result lx_finished_extend(lx_finished *f, const uint32_t *texels, uint32_t count, lx_error *error)
 {
-    const uint32_t page_texels = f->map->view.page_size * f->map->view.page_size;
+    const uint32_t page_texels = f->page_size * f->page_size;
     if (count == 0) return LX_OK;
     if (!f->scratch) {
         size_t value_count;
@@ -108,7 +110,7 @@ lx_result lx_finished_extend(lx_finished *f, const uint32_t *texels, uint32_t co
         f->entry[texels[i]] = f->luxel_count + i;
         ++f->first_extra[texels[i] / page_texels + 1];
     }
-    for (uint32_t page = 0; page < f->map->view.page_count; ++page) f->first_extra[page + 1] += f->first_extra[page];
+    for (uint32_t page = 0; page < f->page_count; ++page) f->first_extra[page + 1] += f->first_extra[page];
     return LX_OK;
 }
 
@@ -195,7 +197,7 @@ static lx_rgb colour_of(const lx_finished *f, const layer_part *part, uint32_t e
 
 lx_result lx_finished_image(const lx_finished *f, uint32_t page, uint32_t layer, float *out_rgb, lx_error *error)
 {
-    const size_t texel_count = (size_t)f->map->view.page_size * f->map->view.page_size;
+    const size_t texel_count = (size_t)f->page_size * f->page_size;
     const uint32_t *entry = f->entry + page * texel_count;
     layer_part part;
     const lx_result result = open_part(f, layer, page, page + 1, &part, error);
@@ -213,22 +215,25 @@ lx_result lx_finished_image(const lx_finished *f, uint32_t page, uint32_t layer,
 lx_result lx_finished_range(const lx_finished *f, uint32_t layer, lx_layer_range *out, lx_error *error)
 {
     layer_part part;
-    const lx_result result = open_part(f, layer, 0, f->map->view.page_count, &part, error);
+    const lx_result result = open_part(f, layer, 0, f->page_count, &part, error);
     if (result != LX_OK) return result;
     float largest = 0;
     double sum = 0;
+    uint32_t count = 0;
     for (uint32_t i = 0; i < f->luxel_count; ++i) {
-        const lx_rgb c = colour_of(f, &part, f->entry[f->map->texel[i]]);
+        if (!f->shown[i]) continue;
+        const lx_rgb c = part.luxels[i];
+        ++count;
         largest = fmaxf(largest, fmaxf(c.r, fmaxf(c.g, c.b)));
         sum += (double)c.r + (double)c.g + (double)c.b;
     }
     for (uint32_t i = 0; i < f->extra_count; ++i) largest = fmaxf(largest, fmaxf(part.extras[i].r, fmaxf(part.extras[i].g, part.extras[i].b)));
-    *out = (lx_layer_range){largest, f->luxel_count ? sum / (3.0 * f->luxel_count) : 0};
+    *out = (lx_layer_range){largest, count ? sum / (3.0 * count) : 0};
     lx_free(part.owned);
     return LX_OK;
 }
 
 uint64_t lx_finished_bytes(uint64_t luxel_count, uint64_t texel_count, uint32_t layer_count, bool on_disk)
 {
-    return texel_count * sizeof(uint32_t) + luxel_count * sizeof(lx_rgb) * (on_disk ? 1 : layer_count);
+    return texel_count * sizeof(uint32_t) + luxel_count * (1 + sizeof(lx_rgb) * (on_disk ? 1 : layer_count));
 }

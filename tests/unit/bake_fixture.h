@@ -3,6 +3,7 @@
 #define BAKE_FIXTURE_H
 
 #include "bake/bake.h"
+#include "bake/luxel_map.h"
 #include "scene/gltf.h"
 
 #include <stdlib.h>
@@ -79,22 +80,23 @@ static lx_result fixture_fill(lx_bake *bake, lx_error *error)
         bake->texel_coverage[i] = chart == LX_NO_CHART || (x + 2) % 20 < 2 || (x + 2) % 20 >= 18 ? 0 : 255;
         if (chart != LX_NO_CHART && !bake->texel_coverage[i]) extras[extra_count++] = i;
     }
+    lx_bake_map map = {0};
     lx_finished_destroy(bake->finished);
-    lx_bake_map_release(&bake->map);
     bake->finished = NULL;
-    lx_result result = lx_bake_map_build(size, bake->atlas->page_count, bake->texel_chart, bake->texel_coverage, &bake->map, error);
-    if (result == LX_OK) result = lx_finished_create(&bake->map, bake->layer_count, false, NULL, &bake->finished, error);
+    lx_result result = lx_bake_map_build(size, bake->atlas->page_count, bake->texel_chart, bake->texel_coverage, &map, error);
+    if (result == LX_OK) result = lx_finished_create(&map.view, bake->layer_count, false, NULL, &bake->finished, error);
     for (uint32_t page = 0; page < bake->atlas->page_count && result == LX_OK; ++page)
-        result = lx_finished_dilate(bake->finished, page, 0, bake->texel_chart + page * page_texels, error);
+        result = lx_finished_dilate(bake->finished, &map.view, page, 0, bake->texel_chart + page * page_texels, error);
     if (result == LX_OK) result = lx_finished_extend(bake->finished, extras, extra_count, error);
     for (uint32_t layer = 0; layer < bake->layer_count && result == LX_OK; ++layer)
         for (uint32_t entry = 0; entry < lx_finished_count(bake->finished) && result == LX_OK; ++entry) {
-            const uint32_t i = entry < bake->map.view.count ? bake->map.texel[entry] : extras[entry - bake->map.view.count];
+            const uint32_t i = entry < map.view.count ? map.texel[entry] : extras[entry - map.view.count];
             const uint32_t page = i / page_texels, x = i % size, y = i / size % size, chart = bake->texel_chart[i];
             const lx_rgb rgb = {fixture_texel(page, layer, chart, x, y, 0), fixture_texel(page, layer, chart, x, y, 1),
                                 fixture_texel(page, layer, chart, x, y, 2)};
             result = lx_finished_write(bake->finished, layer, entry, 1, &rgb, error);
         }
+    lx_bake_map_release(&map);
     free(extras);
     return result;
 }
