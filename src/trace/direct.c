@@ -6,7 +6,8 @@
 // Every luxel sends the rays of its first four samples. Where they all met the same (all clear, all dark, the same pane of glass), in the luxel
 // and in its neighbours, the luxel is taken to see the source so altogether, and its light is that of its samples without further rays. Else it sends the
 // rays of 16 samples, and so do neighbours that turn out to differ from it, until no neighbours differ unlooked-at: the outline of a shadow is followed around.
-// Luxels whose 16 rays differ lie in a penumbra or on an edge and send the rays of all samples.
+// Luxels whose 16 rays differ lie in a penumbra or on an edge and send the rays of all samples. So do those whose looks, with their neighbours', are too few
+// to tell: in narrow charts, and where a few samples carry most of the light.
 //
 // A luxel's samples are cut into four runs. Each is a well-spread set in itself, so what they disagree by tells the variance of their mean.
 #include "trace/direct.h"
@@ -30,6 +31,9 @@ enum {
 // Unshadowed light whose mean varies by more, of itself, is looked at in all samples instead of the first 16.
 static const float fine_deviation = 0.004f;
 
+// Looks of equal weight that must agree in a luxel and its neighbours: what they miss is a share of the source below its inverse, mostly.
+static const float enough_looks = 20, enough_own_looks = 6; // the latter of the 16 that a luxel with doubts takes
+
 // One of a luxel's first samples: what would arrive, and what share of it does.
 typedef struct look {
     lx_rgb light, transmittance;
@@ -42,9 +46,11 @@ typedef enum verdict { sees_nothing, sees_same, sees_both } verdict;
 typedef struct luxel_state {
     verdict verdict;
     lx_rgb transmittance; // sees_same: of all rays
+    float light, squares; // of the looks: sums of their unshadowed light and its squares
     uint8_t looked;       // looks taken: probes or lx_direct_sites
     bool possible;        // the source is not behind all sites' horizons
     bool listed;
+    bool doubtful;        // sees_same, by too few looks
 } luxel_state;
 
 struct lx_direct_batch {
@@ -203,9 +209,13 @@ static void judge(lx_direct_batch *b, uint32_t luxel)
 {
     luxel_state *s = &b->luxels[luxel];
     s->verdict = sees_nothing;
+    s->light = s->squares = 0;
     for (uint32_t i = 0; i < s->looked; ++i) {
         const look *l = &b->looks[luxel][i];
         if (!l->arrives) continue;
+        const float light = lx_rgb_max(l->light);
+        s->light += light;
+        s->squares += light * light;
         if (s->verdict == sees_nothing) {
             s->verdict = sees_same;
             s->transmittance = l->transmittance;
@@ -266,6 +276,18 @@ static bool differ(const luxel_state *a, const luxel_state *b)
     return b->verdict == sees_both || (a->verdict == sees_same && b->verdict == sees_same && !same_rgb(a->transmittance, b->transmittance));
 }
 
+// Looks of a luxel and its neighbours, counted by weight: (sum of w)² / sum of w², Kish's effective sample size.
+static float count_looks(const job *j, uint32_t luxel, const uint16_t *around, uint32_t count)
+{
+    const luxel_state *luxels = j->b->luxels;
+    float light = luxels[luxel].light, squares = luxels[luxel].squares;
+    for (uint32_t k = 0; k < count; ++k) {
+        light += luxels[around[k]].light;
+        squares += luxels[around[k]].squares;
+    }
+    return squares > 0 ? light * light / squares : 0;
+}
+
 static void look_where_it_matters(const job *j)
 {
     lx_direct_batch *b = j->b;
@@ -276,8 +298,8 @@ static void look_where_it_matters(const job *j)
     count = 0;
     for (uint32_t i = 0; i < j->tile->count; ++i) {
         luxel_state *s = &b->luxels[i];
-        s->listed = s->verdict != sees_same;
-        const uint32_t n = s->listed ? 0 : find_neighbours(j, i, around);
+        const uint32_t n = find_neighbours(j, i, around);
+        s->listed = s->verdict != sees_same || count_looks(j, i, around, n) < enough_looks;
         for (uint32_t k = 0; k < n && !s->listed; ++k) s->listed = differ(s, &b->luxels[around[k]]);
         if (s->listed) b->list[count++] = (uint16_t)i;
     }
@@ -295,6 +317,11 @@ static void look_where_it_matters(const job *j)
         }
         memcpy(b->list, b->next, next * sizeof *b->list);
         count = next;
+    }
+    for (uint32_t i = 0; i < j->tile->count; ++i) {
+        luxel_state *s = &b->luxels[i];
+        if (!s->listed || s->verdict != sees_same) continue;
+        s->doubtful = count_looks(j, i, around, 0) < enough_own_looks || count_looks(j, i, around, find_neighbours(j, i, around)) < enough_looks;
     }
 }
 
@@ -421,7 +448,7 @@ bool lx_direct_light(lx_direct_batch *b, const lx_direct_settings *settings, con
     bool any = false;
     for (uint32_t i = 0; i < tile->count; ++i) {
         const luxel_state *s = &b->luxels[i];
-        if (s->verdict == sees_same) {
+        if (s->verdict == sees_same && !s->doubtful) {
             if (lx_rgb_is_black(s->transmittance)) continue;
             sum_evenly_lit(&j, i, mean, variance);
             any = true;

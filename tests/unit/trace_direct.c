@@ -172,7 +172,7 @@ static void rays_are_spared_where_neighbours_agree(void **state)
         // the last ray or two that few looks missed.
         double brightest = 0;
         for (uint32_t i = 0; i < luxels; ++i) brightest = fmax(brightest, (double)full[i].g);
-        for (uint32_t i = 0; i < luxels; ++i) assert_near((double)mean[i].g, (double)full[i].g, 0.02 * (double)full[i].g + 0.01 * brightest);
+        for (uint32_t i = 0; i < luxels; ++i) assert_near((double)mean[i].g, (double)full[i].g, 0.02 * (double)full[i].g + 0.02 * brightest);
     }
     end(&f);
 }
