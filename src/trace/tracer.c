@@ -173,6 +173,7 @@ static lx_result build_accel(lx_tracer *tracer, lx_error *error)
         if (!tracer->surfaces[i].positions) continue;
         meshes[i] = (lx_accel_mesh){.vertices = tracer->surfaces[i].positions, .indices = primitive->indices,
                                     .vertex_count = primitive->vertex_count, .triangle_count = primitive->triangle_count,
+                                    .mirrored = tracer->surfaces[i].orientation < 0,
                                     .has_holes = tracer->surfaces[i].kind == LX_SURFACE_CUTOUT,
                                     .transmits = tracer->surfaces[i].kind == LX_SURFACE_TRANSLUCENT};
     }

@@ -22,6 +22,7 @@ typedef struct lx_hit {
     uint32_t triangle; ///< Of the surface's primitive.
     float t;
     float u, v;        ///< Barycentrics: position = (1-u-v) p0 + u p1 + v p2 over the primitive's corners in index order.
+    bool back;         ///< The ray came to the back side.
 } lx_hit;
 
 /// A hit as light transport sees it (spec: surfaces). Colours are linear.
