@@ -14,6 +14,7 @@ typedef struct lx_accel_mesh {
     uint32_t vertex_count, triangle_count;
     bool has_holes;     ///< Some hits may be holes (cutouts): asks `is_hole`.
     bool transmits;     ///< Some light may pass: asks `transmittance` on shadow rays.
+    float front;        ///< The side that triangles show to the outside: 1 where they are counter-clockwise, -1 clockwise, 0: both sides are outside.
 } lx_accel_mesh;
 
 /// Asked during traversal, from any thread; must be pure.
@@ -30,6 +31,8 @@ void lx_accel_destroy(lx_accel *accel);
 
 void lx_accel_closest(const lx_accel *accel, const lx_ray *rays, lx_hit *hits, size_t count);
 void lx_accel_transmittance(const lx_accel *accel, const lx_ray *rays, lx_rgb *transmittance, size_t count);
+/// As lx_trace_crowded.
+bool lx_accel_crowded(const lx_accel *accel, const lx_patch *patches, size_t count);
 
 /// The instruction set in use, for the record ("avx2").
 const char *lx_accel_isa(const lx_accel *accel);

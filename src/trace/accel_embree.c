@@ -15,6 +15,7 @@ struct lx_accel {
     RTCDevice device;
     RTCScene scene;
     lx_accel_surface_queries queries;
+    lx_accel_mesh *meshes; // for queries about what is near
     bool any_filter;
     char isa[16];
 };
@@ -159,6 +160,12 @@ lx_result lx_accel_create(const lx_accel_mesh *meshes, uint32_t mesh_count, lx_a
     lx_accel *accel = lx_calloc_array(1, sizeof *accel);
     if (!accel) return lx_fail_memory(error, "ray tracing structure");
     accel->queries = queries;
+    accel->meshes = lx_malloc_array(mesh_count, sizeof *meshes);
+    if (!accel->meshes) {
+        result = lx_fail_memory(error, "ray tracing structure");
+        goto cleanup;
+    }
+    if (mesh_count > 0) memcpy(accel->meshes, meshes, mesh_count * sizeof *meshes);
     char config[64] = "threads=1,set_affinity=0";
     if (isa[0]) {
         strcat(config, ",isa=");
@@ -192,6 +199,7 @@ void lx_accel_destroy(lx_accel *accel)
     if (!accel) return;
     if (accel->scene) rtcReleaseScene(accel->scene);
     if (accel->device) rtcReleaseDevice(accel->device);
+    lx_free(accel->meshes);
     lx_free(accel);
 }
 
@@ -220,8 +228,9 @@ static lx_hit intersect_one(const lx_accel *accel, ray_context *context, const l
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
     rtcIntersect1(accel->scene, &context->embree, &query);
+    const float along = query.hit.Ng_x * ray->direction.x + query.hit.Ng_y * ray->direction.y + query.hit.Ng_z * ray->direction.z;
     return (lx_hit){.surface = query.hit.geomID, .triangle = query.hit.primID, .t = query.ray.tfar, .u = query.hit.u,
-                    .v = query.hit.v};
+                    .v = query.hit.v, .back = along > 0};
 }
 
 void lx_accel_closest(const lx_accel *accel, const lx_ray *rays, lx_hit *hits, size_t count)
@@ -274,4 +283,77 @@ void lx_accel_transmittance(const lx_accel *accel, const lx_ray *rays, lx_rgb *t
                 transmittance[first + i] = crossings[i].transmittance;
         }
     }
+}
+
+// ---- what is near -----------------------------------------------------------------------------------------------------------
+
+// Closest point of a triangle. Based on: [Ericson2005] Christer Ericson, "Real-Time Collision Detection", 5.1.5.
+static lx_vec3 closest_point(lx_vec3 p, const lx_vec3 corner[3])
+{
+    const lx_vec3 a = corner[0], b = corner[1], c = corner[2], ab = lx_sub(b, a), ac = lx_sub(c, a);
+    const lx_vec3 ap = lx_sub(p, a), bp = lx_sub(p, b), cp = lx_sub(p, c);
+    const float d1 = lx_dot(ab, ap), d2 = lx_dot(ac, ap), d3 = lx_dot(ab, bp), d4 = lx_dot(ac, bp), d5 = lx_dot(ab, cp), d6 = lx_dot(ac, cp);
+    if (d1 <= 0 && d2 <= 0) return a;
+    if (d3 >= 0 && d4 <= d3) return b;
+    if (d6 >= 0 && d5 <= d6) return c;
+    const float va = d3 * d6 - d5 * d4, vb = d5 * d2 - d1 * d6, vc = d1 * d4 - d3 * d2;
+    if (vc <= 0 && d1 >= 0 && d3 <= 0) return lx_mad(a, ab, d1 / (d1 - d3));
+    if (vb <= 0 && d2 >= 0 && d6 <= 0) return lx_mad(a, ac, d2 / (d2 - d6));
+    if (va <= 0 && d4 >= d3 && d5 >= d6) return lx_mad(b, lx_sub(c, b), (d4 - d3) / ((d4 - d3) + (d5 - d6)));
+    const float sum = va + vb + vc;
+    return lx_mad(lx_mad(a, ab, vb / sum), ac, vc / sum);
+}
+
+typedef struct near_query {
+    const lx_accel *accel;
+    const lx_patch *patch;
+    float radius, slack; // slack: what still counts as touching
+    bool crowded;
+} near_query;
+
+// Does the triangle rise over the patch, close to it, with a part of the patch behind it (a solid's), or on both of its sides?
+static bool crowds(const near_query *q, const lx_accel_mesh *mesh, unsigned triangle)
+{
+    const lx_patch *patch = q->patch;
+    lx_vec3 corner[3];
+    float rise = -INFINITY, low = INFINITY, high = -INFINITY;
+    for (int i = 0; i < 3; ++i) {
+        corner[i] = mesh->vertices[mesh->indices[3 * (size_t)triangle + (size_t)i]];
+        rise = lx_max(rise, lx_dot(lx_sub(corner[i], patch->centre), patch->normal));
+    }
+    if (rise <= q->slack) return false;
+    const lx_vec3 normal = lx_normalize_or(lx_cross(lx_sub(corner[1], corner[0]), lx_sub(corner[2], corner[0])), (lx_vec3){0, 0, 0});
+    for (uint32_t i = 0; i < patch->corner_count; ++i) {
+        const float d = lx_dot(lx_sub(patch->corners[i], corner[0]), normal) * (mesh->front == 0 ? 1 : mesh->front);
+        low = lx_min(low, d);
+        high = lx_max(high, d);
+    }
+    if (!(low < -q->slack) || (mesh->front == 0 && !(high > q->slack))) return false;
+    return lx_distance(closest_point(patch->centre, corner), patch->centre) <= q->radius;
+}
+
+static bool visit_near(struct RTCPointQueryFunctionArguments *arguments)
+{
+    near_query *q = arguments->userPtr;
+    if (q->crowded || !crowds(q, &q->accel->meshes[arguments->geomID], arguments->primID)) return false;
+    q->crowded = true;
+    arguments->query->radius = 0; // nothing more to find
+    return true;
+}
+
+bool lx_accel_crowded(const lx_accel *accel, const lx_patch *patches, size_t count)
+{
+    for (size_t i = 0; i < count; ++i) {
+        const lx_patch *patch = &patches[i];
+        near_query q = {.accel = accel, .patch = patch};
+        for (uint32_t k = 0; k < patch->corner_count; ++k) q.radius = lx_max(q.radius, lx_distance(patch->corners[k], patch->centre));
+        q.slack = 1e-3f * q.radius + 1e-6f * lx_max_abs(patch->centre);
+        q.radius += q.slack;
+        struct RTCPointQuery query = {.x = patch->centre.x, .y = patch->centre.y, .z = patch->centre.z, .radius = q.radius};
+        struct RTCPointQueryContext context;
+        rtcInitPointQueryContext(&context);
+        rtcPointQuery(accel->scene, &query, &context, visit_near, &q);
+        if (q.crowded) return true;
+    }
+    return false;
 }

@@ -155,6 +155,7 @@ static lx_result build_surfaces(lx_tracer *tracer, bool include_dynamic, lx_erro
         lx_traced_surface *out = &tracer->surfaces[i];
         out->kind = classify(scene, s);
         out->orientation = lx_mat4_determinant3(instance->transform) < 0 ? -1.0f : 1.0f;
+        tracer->any_mirrored |= out->orientation < 0;
         if (!instance->is_static && !include_dynamic) continue;
         out->positions = next;
         for (uint32_t v = 0; v < primitive->vertex_count; ++v)
@@ -174,7 +175,8 @@ static lx_result build_accel(lx_tracer *tracer, lx_error *error)
         meshes[i] = (lx_accel_mesh){.vertices = tracer->surfaces[i].positions, .indices = primitive->indices,
                                     .vertex_count = primitive->vertex_count, .triangle_count = primitive->triangle_count,
                                     .has_holes = tracer->surfaces[i].kind == LX_SURFACE_CUTOUT,
-                                    .transmits = tracer->surfaces[i].kind == LX_SURFACE_TRANSLUCENT};
+                                    .transmits = tracer->surfaces[i].kind == LX_SURFACE_TRANSLUCENT,
+                                    .front = lx_surface_is_solid(tracer, i) ? tracer->surfaces[i].orientation : 0};
     }
     const lx_accel_surface_queries queries = {tracer, is_hole, transmittance_at};
     const lx_result result =
@@ -398,11 +400,19 @@ const char *lx_tracer_isa(const lx_tracer *tracer)
 void lx_trace_closest(const lx_tracer *tracer, const lx_ray *rays, lx_hit *hits, size_t count)
 {
     lx_accel_closest(tracer->accel, rays, hits, count);
+    if (!tracer->any_mirrored) return;
+    for (size_t i = 0; i < count; ++i)
+        if (hits[i].surface != LX_MISS && tracer->surfaces[hits[i].surface].orientation < 0) hits[i].back = !hits[i].back;
 }
 
 void lx_trace_transmittance(const lx_tracer *tracer, const lx_ray *rays, lx_rgb *transmittance, size_t count)
 {
     lx_accel_transmittance(tracer->accel, rays, transmittance, count);
+}
+
+bool lx_trace_crowded(const lx_tracer *tracer, const lx_patch *patches, size_t count)
+{
+    return lx_accel_crowded(tracer->accel, patches, count);
 }
 
 static float offset_component(float position, float normal)
@@ -480,9 +490,19 @@ lx_vec3 lx_normal_at(const lx_tracer *tracer, uint32_t surface, uint32_t triangl
     return interpolated_normal(tracer, surface, &p, geometric_normal(tracer, surface, corners));
 }
 
+bool lx_surface_is_plain(const lx_tracer *tracer, uint32_t surface)
+{
+    return tracer->surfaces[surface].kind == LX_SURFACE_OPAQUE && tracer->scene->surfaces[surface].source < 0;
+}
+
 bool lx_surface_is_double_sided(const lx_tracer *tracer, uint32_t surface)
 {
     return material_of(tracer, surface)->double_sided;
+}
+
+bool lx_surface_is_solid(const lx_tracer *tracer, uint32_t surface)
+{
+    return tracer->surfaces[surface].kind == LX_SURFACE_OPAQUE && !lx_surface_is_double_sided(tracer, surface);
 }
 
 static lx_shading shade(const lx_tracer *tracer, lx_vec3 direction, uint32_t surface, uint32_t triangle, float u, float v)

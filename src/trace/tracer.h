@@ -22,6 +22,7 @@ typedef struct lx_hit {
     uint32_t triangle; ///< Of the surface's primitive.
     float t;
     float u, v;        ///< Barycentrics: position = (1-u-v) p0 + u p1 + v p2 over the primitive's corners in index order.
+    bool back;         ///< The ray came to the back side.
 } lx_hit;
 
 /// A hit as light transport sees it (spec: surfaces). Colours are linear.
@@ -65,6 +66,16 @@ lx_rgb lx_tracer_sky_radiance(const lx_tracer *tracer, lx_vec3 direction);
 void lx_trace_closest(const lx_tracer *tracer, const lx_ray *rays, lx_hit *hits, size_t count);
 /// How much light passes each ray: product over crossed surfaces, each triangle once. Thread-safe.
 void lx_trace_transmittance(const lx_tracer *tracer, const lx_ray *rays, lx_rgb *transmittance, size_t count);
+/// A flat piece of surface: a convex polygon of at most 8 corners.
+typedef struct lx_patch {
+    lx_vec3 centre, normal;
+    lx_vec3 corners[8];
+    uint32_t corner_count;
+} lx_patch;
+
+/// Does anything reach into the patches, or so close above them that one place there may be inside a solid, or in another room, and the next not? True
+/// too often rather than too rarely. Surfaces that only touch a patch along its edge, as walls do the floor of their room, do not count. Thread-safe.
+bool lx_trace_crowded(const lx_tracer *tracer, const lx_patch *patches, size_t count);
 /// Shades hits; misses are skipped. Thread-safe.
 void lx_shade_hits(const lx_tracer *tracer, const lx_ray *rays, const lx_hit *hits, lx_shading *shading, size_t count);
 
@@ -78,6 +89,10 @@ bool lx_triangle_normals(const lx_tracer *tracer, uint32_t surface, uint32_t tri
 lx_vec3 lx_normal_at(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, float u, float v);
 /// Does the surface shine or shade from its back too?
 bool lx_surface_is_double_sided(const lx_tracer *tracer, uint32_t surface);
+/// Is a hit on its front (or on its back, which is black unless it is double-sided) all there is to know of it: opaque, and no light source?
+bool lx_surface_is_plain(const lx_tracer *tracer, uint32_t surface);
+/// Has the surface an inside behind it? Opaque ones with one side have; panes, cutouts and sheets with two sides don't.
+bool lx_surface_is_solid(const lx_tracer *tracer, uint32_t surface);
 
 /// A ray's origin moved off its surface to the side of `normal` (unit, geometric) by a few roundings of the coordinates.
 /// Based on: [WachterBinder2019] "A Fast and Robust Method for Avoiding Self-Intersection", Ray Tracing Gems, ch. 6.

@@ -1,0 +1,185 @@
+// Placing sites: a point of the texel's square, its triangle, its place in the world.
+//
+// Based on: [Hanika2021] Johannes Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, ch. 4 (lifting sites to the smooth surface that
+// vertex normals pretend).
+#include "bake/texel_sites.h"
+
+#include "math/sobol.h"
+#include "trace/sampling.h"
+
+uint32_t lx_luxel_stream(const lx_bake *bake, const lx_luxel_page *page, uint32_t texel)
+{
+    return lx_stream_key(bake->desc.transport.seed, page->number, texel);
+}
+
+void lx_texel_open(lx_texel *t, const lx_bake *bake, const lx_luxel_page *page, uint32_t texel)
+{
+    const uint32_t size = bake->atlas->page_size;
+    t->bake = bake;
+    t->fragments = page->fragments + page->first[texel];
+    t->fragment_count = page->first[texel + 1] - page->first[texel];
+    t->x = texel % size;
+    t->y = texel / size;
+    t->stream = lx_luxel_stream(bake, page, texel);
+    t->area = 0;
+    for (uint32_t i = 0; i < t->fragment_count; ++i) t->area += t->fragments[i].area;
+    for (uint32_t i = 0; i < lx_piece_slots; ++i) t->pieces[i].fragment = UINT32_MAX;
+}
+
+const lx_piece *lx_texel_piece(lx_texel *t, uint32_t fragment)
+{
+    lx_piece *piece = &t->pieces[fragment % lx_piece_slots];
+    if (piece->fragment == fragment) return piece;
+    const lx_fragment *f = &t->fragments[fragment];
+    const lx_tracer *tracer = t->bake->tracer;
+    const lx_surface *surface = &t->bake->scene->surfaces[f->surface];
+    piece->fragment = fragment;
+    lx_triangle_on_page(t->bake->atlas, surface->instance, surface->primitive, f->triangle, piece->corner);
+    piece->whole = lx_cross_of(piece->corner[0], piece->corner[1], piece->corner[2]);
+    piece->part = lx_clip_to_texel(piece->corner, t->x, t->y);
+    lx_triangle_corners(tracer, f->surface, f->triangle, piece->world);
+    lx_vec3 at;
+    lx_hit_geometry(tracer, &(lx_hit){.surface = f->surface, .triangle = f->triangle}, &at, &piece->normal);
+    piece->smooth = lx_triangle_normals(tracer, f->surface, f->triangle, piece->vertex_normal);
+    const lx_vec3 cross = lx_cross(lx_sub(piece->world[1], piece->world[0]), lx_sub(piece->world[2], piece->world[0]));
+    piece->texel_m = (float)sqrt((double)lx_length(cross) / fabs(piece->whole));
+    return piece;
+}
+
+// Barycentrics of the second and third corner. The point may lie a rounding, or a sliver too thin for a fragment, outside.
+static lx_vec2 barycentrics(const lx_piece *piece, lx_point p)
+{
+    const double u = lx_cross_of(piece->corner[0], p, piece->corner[2]) / piece->whole;
+    const double v = lx_cross_of(piece->corner[0], piece->corner[1], p) / piece->whole;
+    return (lx_vec2){(float)u, (float)v};
+}
+
+static lx_vec2 onto_triangle(lx_vec2 b)
+{
+    b = (lx_vec2){lx_clamp(b.x, 0, 1), lx_clamp(b.y, 0, 1)};
+    const float sum = b.x + b.y;
+    return sum > 1 ? (lx_vec2){b.x / sum, b.y / sum} : b;
+}
+
+static lx_vec3 blend(const lx_piece *piece, lx_vec2 b)
+{
+    return lx_add(lx_add(lx_scale(piece->world[0], 1 - b.x - b.y), lx_scale(piece->world[1], b.x)), lx_scale(piece->world[2], b.y));
+}
+
+lx_vec3 lx_piece_point(const lx_piece *piece, lx_point on_page)
+{
+    return blend(piece, onto_triangle(barycentrics(piece, on_page)));
+}
+
+// A uniform point of a convex polygon: choose a triangle of its fan by area, then a point of it.
+static lx_point point_in(const lx_polygon *p, lx_vec2 u)
+{
+    const double total = 2 * lx_polygon_area(p);
+    double along = (double)u.x * total;
+    for (int i = 2; i < p->count; ++i) {
+        const double area = fabs(lx_cross_of(p->p[0], p->p[i - 1], p->p[i]));
+        if (along > area && i + 1 < p->count) {
+            along -= area;
+            continue;
+        }
+        u.x = area > 0 ? lx_clamp((float)(along / area), 0, 1) : 0;
+        const lx_vec2 b = lx_sample_triangle(u);
+        const lx_point o = p->p[0], q = p->p[i - 1], r = p->p[i];
+        return (lx_point){o.x + (double)b.x * (q.x - o.x) + (double)b.y * (r.x - o.x),
+                          o.y + (double)b.x * (q.y - o.y) + (double)b.y * (r.y - o.y)};
+    }
+    return p->p[0];
+}
+
+// A texel that is covered all over takes the point as it is and asks which triangle it lies on: that keeps the points' spread. Of others the
+// fragments are lined up by area.
+static const lx_piece *choose(lx_texel *t, lx_vec2 u, lx_vec2 *out_b)
+{
+    const lx_piece *best = NULL;
+    *out_b = (lx_vec2){0, 0};
+    if (t->area > 0.9995f && t->fragment_count <= lx_piece_slots) {
+        const lx_point p = {t->x + (double)u.x, t->y + (double)u.y};
+        float best_inside = -INFINITY;
+        for (uint32_t i = 0; i < t->fragment_count && best_inside < 0; ++i) {
+            const lx_piece *piece = lx_texel_piece(t, i);
+            const lx_vec2 b = barycentrics(piece, p);
+            const float inside = lx_min(lx_min(b.x, b.y), 1 - b.x - b.y);
+            if (inside <= best_inside) continue;
+            best = piece;
+            best_inside = inside;
+            *out_b = b;
+        }
+    } else {
+        uint32_t chosen = 0;
+        float along = u.x * t->area;
+        while (chosen + 1 < t->fragment_count && along > t->fragments[chosen].area) along -= t->fragments[chosen++].area;
+        best = lx_texel_piece(t, chosen);
+        u.x = lx_clamp(along / t->fragments[chosen].area, 0, 1);
+        *out_b = barycentrics(best, point_in(&best->part, u));
+    }
+    *out_b = onto_triangle(*out_b);
+    return best;
+}
+
+// [Hanika2021]: the site moves from the flat triangle to the mean of its projections onto the corners' tangent planes, so that a smooth-shaded surface
+// does not shadow itself along its facets. Only outwards, and never through anything.
+static lx_vec3 lift(const lx_tracer *tracer, const lx_piece *piece, lx_vec2 b, lx_vec3 position)
+{
+    const float weight[3] = {1 - b.x - b.y, b.x, b.y};
+    lx_vec3 shift = {0, 0, 0};
+    for (int i = 0; i < 3; ++i) {
+        const lx_vec3 n = piece->vertex_normal[i];
+        const float below = lx_min(0, lx_dot(lx_sub(position, piece->world[i]), n));
+        if (lx_dot(n, piece->normal) > 0) shift = lx_mad(shift, n, -below * weight[i]);
+    }
+    if (!(lx_dot(shift, piece->normal) > 0)) return position;
+    const lx_ray ray = {.origin = lx_offset_origin(position, piece->normal), .direction = shift, .t_max = 1};
+    lx_hit hit;
+    lx_trace_closest(tracer, &ray, &hit, 1);
+    return lx_mad(position, shift, hit.surface == LX_MISS ? 1.0f : 0.5f * hit.t);
+}
+
+const lx_piece *lx_texel_site(lx_texel *t, uint32_t number, lx_receiver *out)
+{
+    const lx_vec2 u = lx_sobol_pair(number, lx_hash_combine(t->stream, 0x51e1u));
+    lx_vec2 b;
+    const lx_piece *piece = choose(t, u, &b);
+    const lx_fragment *f = &t->fragments[piece->fragment];
+    out->position = blend(piece, b);
+    out->geometric_normal = out->normal = piece->normal;
+    if (piece->smooth) {
+        out->normal = lx_normal_at(t->bake->tracer, f->surface, f->triangle, b.x, b.y);
+        out->position = lift(t->bake->tracer, piece, b, out->position);
+    }
+    return piece;
+}
+
+void lx_luxel_sites(const lx_bake *bake, const lx_luxel_page *page, uint32_t texel, uint32_t first, uint32_t count, lx_receiver *out)
+{
+    lx_texel t;
+    lx_texel_open(&t, bake, page, texel);
+    const uint32_t state = page->state[texel], edge = (bake->atlas->page_size + lx_site_block - 1) / lx_site_block;
+    const lx_settled *settled = NULL;
+    if (state < LX_SITES_INVALID) settled = &page->settled[t.y / lx_site_block * edge + t.x / lx_site_block][state];
+    for (uint32_t i = 0; i < count; ++i) {
+        lx_texel_site(&t, settled ? settled->number[first + i] : first + i, &out[i]);
+        if (settled) out[i].position = settled->position[first + i];
+    }
+}
+
+float lx_luxel_size(const lx_bake *bake, const lx_luxel_page *page, uint32_t texel)
+{
+    lx_texel t;
+    lx_texel_open(&t, bake, page, texel);
+    return t.fragment_count > 0 ? lx_texel_piece(&t, 0)->texel_m : 0;
+}
+
+lx_vec2 lx_piece_barycentrics(const lx_piece *piece, lx_vec3 place)
+{
+    const lx_vec3 e1 = lx_sub(piece->world[1], piece->world[0]), e2 = lx_sub(piece->world[2], piece->world[0]);
+    const lx_vec3 d = lx_sub(place, piece->world[0]), n = lx_cross(e1, e2);
+    const float square = lx_dot(n, n);
+    if (!(square > 0)) return (lx_vec2){0, 0};
+    const float u = lx_clamp(lx_dot(lx_cross(d, e2), n) / square, 0, 1);
+    return (lx_vec2){u, lx_clamp(lx_dot(lx_cross(e1, d), n) / square, 0, 1 - u)};
+}

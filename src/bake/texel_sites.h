@@ -1,0 +1,45 @@
+/// Where a texel's sites stand before anything is known of what is around them.
+#ifndef LX_BAKE_TEXEL_SITES_H
+#define LX_BAKE_TEXEL_SITES_H
+
+#include "bake/luxels.h"
+#include "bake/texel_polygon.h"
+
+/// A fragment made ready: what does not depend on where in it a site lies.
+typedef struct lx_piece {
+    uint32_t fragment;  ///< UINT32_MAX: an empty slot.
+    lx_point corner[3]; ///< Of its triangle, on the page.
+    double whole;       ///< Twice the triangle's area there, with sign.
+    lx_polygon part;    ///< Within the texel.
+    lx_vec3 world[3], vertex_normal[3];
+    lx_vec3 normal;     ///< Geometric.
+    bool smooth;
+    float texel_m;      ///< Edge of a texel on this triangle, metres.
+} lx_piece;
+
+enum { lx_piece_slots = 4 }; ///< Most texels have one or two fragments.
+
+typedef struct lx_texel {
+    const lx_bake *bake;
+    const lx_fragment *fragments;
+    uint32_t x, y, fragment_count, stream;
+    float area;    ///< Of all fragments, share of the square.
+    lx_piece pieces[lx_piece_slots]; ///< Those seen last, by fragment number modulo lx_piece_slots.
+} lx_texel;
+
+void lx_texel_open(lx_texel *t, const lx_bake *bake, const lx_luxel_page *page, uint32_t texel);
+const lx_piece *lx_texel_piece(lx_texel *t, uint32_t fragment);
+
+/// A place on a piece's triangle, in the world.
+lx_vec3 lx_piece_point(const lx_piece *piece, lx_point on_page);
+
+/// Edge of the texel on its surface, metres.
+float lx_luxel_size(const lx_bake *bake, const lx_luxel_page *page, uint32_t texel);
+
+/// Where a place near the piece lies on its triangle: barycentrics of the second and third corner.
+lx_vec2 lx_piece_barycentrics(const lx_piece *piece, lx_vec3 place);
+
+/// Site `number` as it falls. Returns the piece it lies on.
+const lx_piece *lx_texel_site(lx_texel *t, uint32_t number, lx_receiver *out);
+
+#endif
