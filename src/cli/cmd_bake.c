@@ -79,8 +79,9 @@ static int parse(const cli_command *command, int argc, char **argv, bake_options
     if (status != CLI_GO_ON) return status;
 
     if (!o->output) return cli_usage_error(command, "where to? Give a folder with -o OUT");
-    if (strcmp(o->integrator, "path") != 0)
-        return cli_usage_error(command, "--integrator: '%s' does not exist; path is the only one so far", o->integrator);
+    if (strcmp(o->integrator, "path") != 0 && strcmp(o->integrator, "gather") != 0)
+        return cli_usage_error(command, "--integrator: '%s' does not exist", o->integrator);
+    o->bake.integrator = strcmp(o->integrator, "path") == 0 ? LX_INTEGRATOR_PATH : LX_INTEGRATOR_GATHER;
     if (o->atlas.page_size % 4 != 0)
         return cli_usage_error(command, "--page-size: %" PRIu32 " is no multiple of 4", o->atlas.page_size);
     if (o->bake.direct_only && o->bake.indirect_only)
