@@ -1,22 +1,18 @@
-// The bake: luxels, paths, averages, padding. Tiles of luxels are the unit of work; what a tile computes depends on nothing but its place
-// and the settings, so any number of threads gives the same bits.
+// The bake: luxels, their light by one integrator or the other, padding. Tiles of luxels are the unit of work; what a tile computes depends on
+// nothing but its place and the settings, so any number of threads gives the same bits.
 #include "bake/bake.h"
 
 #include "bake/advice.h"
 #include "bake/animations.h"
+#include "bake/bake_job.h"
 #include "bake/layers.h"
-#include "bake/luxels.h"
 #include "base/clock.h"
 #include "base/error.h"
-#include "math/hash.h"
 #include "post/dilate.h"
 
 #include <string.h>
 
-enum {
-    tile_edge = lx_site_block, // texels; the same blocks the pack is stored in
-    most_samples = 1 << 24,
-};
+enum { most_samples = 1 << 24 };
 
 lx_transport_desc lx_transport_desc_default(void)
 {
@@ -111,166 +107,65 @@ void lx_bake_get_summary(const lx_bake *bake, lx_bake_summary *out)
     *out = bake->summary;
 }
 
-// ---- tiles ------------------------------------------------------------------------------------------------------------------
-
-// Working memory of one worker. A tile has at most tile_edge² texels.
-typedef struct tile_scratch {
-    lx_path_batch *batch;
-    double *sums;         // [texel of the tile][layer][channel]
-    lx_receiver *sites;   // [texel of the tile][lx_site_count]
-    uint32_t texels[tile_edge * tile_edge]; // on the page
-    lx_path_start starts[lx_path_batch_size];
-} tile_scratch;
-
-typedef struct luxel_tile {
-    uint32_t page, x, y;
-    float texel_count;
-} luxel_tile;
-
-typedef struct bake_job {
-    lx_bake *bake;
-    lx_luxel_page *pages;
-    luxel_tile *tiles;
-    size_t tile_count;
-    tile_scratch *scratch; // [worker]
-    lx_path_settings settings;
-    uint32_t site_count;
-    lx_stage_seconds stages;
-} bake_job;
-
-static uint32_t collect_texels(const bake_job *job, const luxel_tile *tile, tile_scratch *s)
-{
-    const uint32_t size = job->bake->atlas->page_size;
-    const uint8_t *coverage = job->bake->texel_coverage + (size_t)tile->page * size * size;
-    uint32_t count = 0;
-    for (uint32_t y = tile->y; y < tile->y + tile_edge && y < size; ++y)
-        for (uint32_t x = tile->x; x < tile->x + tile_edge && x < size; ++x)
-            if (coverage[(size_t)y * size + x]) s->texels[count++] = y * size + x;
-    return count;
-}
-
-static void place_sites(const bake_job *job, const luxel_tile *tile, tile_scratch *s, uint32_t count)
-{
-    for (uint32_t i = 0; i < count; ++i)
-        lx_luxel_sites(job->bake, &job->pages[tile->page], s->texels[i], 0, job->site_count, s->sites + (size_t)i * lx_site_count);
-}
-
-// Texel by texel, so that the paths of a batch start close together. A site keeps a run of consecutive samples, which is
-// a well-spread set in itself.
-static void trace_texels(const bake_job *job, const luxel_tile *tile, tile_scratch *s, uint32_t count)
-{
-    const uint32_t samples = job->bake->desc.samples;
-    const lx_luxel_page *page = &job->pages[tile->page];
-    size_t filled = 0;
-    for (uint32_t i = 0; i < count; ++i) {
-        if (!lx_luxel_is_valid(page, s->texels[i])) continue;
-        const uint32_t stream = lx_luxel_stream(job->bake, page, s->texels[i]);
-        for (uint32_t sample = 0; sample < samples; ++sample) {
-            const uint32_t site = (uint32_t)((uint64_t)sample * job->site_count / samples);
-            s->starts[filled++] = (lx_path_start){.receiver = s->sites[(size_t)i * lx_site_count + site], .weight = {1, 1, 1},
-                                                  .stream = stream, .sample = sample, .target = i};
-            if (filled == lx_path_batch_size) {
-                if (lx_pool_is_stopping(job->bake->scene->context->pool)) return;
-                lx_path_trace(s->batch, &job->settings, s->starts, filled, s->sums, NULL);
-                filled = 0;
-            }
-        }
-    }
-    lx_path_trace(s->batch, &job->settings, s->starts, filled, s->sums, NULL);
-}
-
-static void store_texels(const bake_job *job, const luxel_tile *tile, const tile_scratch *s, uint32_t count)
-{
-    const lx_bake *bake = job->bake;
-    const double scale = 1.0 / bake->desc.samples;
-    for (uint32_t layer = 0; layer < bake->layer_count; ++layer) {
-        float *image = lx_bake_image(bake, tile->page, layer);
-        for (uint32_t i = 0; i < count; ++i) {
-            const double *sum = s->sums + 3 * ((size_t)i * bake->layer_count + layer);
-            for (int c = 0; c < 3; ++c) image[3 * (size_t)s->texels[i] + (size_t)c] = (float)(sum[c] * scale);
-        }
-    }
-}
-
-static lx_result bake_tile(void *user, size_t task, uint32_t worker, lx_error *error)
-{
-    (void)error;
-    const bake_job *job = user;
-    const luxel_tile *tile = &job->tiles[task];
-    tile_scratch *s = &job->scratch[worker];
-    const uint32_t count = collect_texels(job, tile, s);
-    memset(s->sums, 0, sizeof(double) * 3 * count * job->bake->layer_count);
-    place_sites(job, tile, s, count);
-    trace_texels(job, tile, s, count);
-    store_texels(job, tile, s, count);
-    return LX_OK;
-}
-
 // ---- stages -----------------------------------------------------------------------------------------------------------------
 
 static lx_result rasterise_page(void *user, size_t page, uint32_t worker, lx_error *error)
 {
     (void)worker;
-    bake_job *job = user;
+    lx_bake_job *job = user;
     return lx_luxels_rasterise(job->bake, (uint32_t)page, &job->pages[page], error);
 }
 
+// Where the luxels of a tile are, and whether their light will mean anything.
 static lx_result settle_tile(void *user, size_t task, uint32_t worker, lx_error *error)
 {
     (void)worker;
-    bake_job *job = user;
-    const luxel_tile *tile = &job->tiles[task];
-    return lx_luxels_settle(job->bake, &job->pages[tile->page], tile->x, tile->y, error);
+    lx_bake_job *job = user;
+    const lx_luxel_tile *tile = &job->map.tiles[task];
+    lx_luxel_page *page = &job->pages[tile->page];
+    const lx_result result = lx_luxels_settle(job->bake, page, tile->x, tile->y, error);
+    if (result != LX_OK) return result;
+    for (uint32_t i = tile->first; i < tile->first + tile->count; ++i) {
+        enum { sites = 4 };
+        uint32_t texel;
+        lx_job_page(job, i, &texel);
+        job->map.size_m[i] = lx_luxel_size(job->bake, page, texel);
+        job->map.valid[i] = lx_luxel_is_valid(page, texel);
+        if (!job->map.valid[i]) continue;
+        lx_receiver r[sites];
+        lx_luxel_sites(job->bake, page, texel, 0, sites, r);
+        lx_vec3 position = {0, 0, 0}, normal = {0, 0, 0};
+        for (int k = 0; k < sites; ++k) {
+            position = lx_mad(position, r[k].position, 1.0f / sites);
+            normal = lx_add(normal, r[k].normal);
+        }
+        job->map.position[i] = position;
+        job->map.normal[i] = lx_normalize_or(normal, r[0].geometric_normal);
+    }
+    return LX_OK;
 }
 
-static lx_result list_tiles(bake_job *job, lx_error *error)
+static lx_result place_luxels(lx_bake_job *job, lx_error *error)
 {
+    lx_result result = LX_OK;
     const lx_bake *bake = job->bake;
-    const uint32_t size = bake->atlas->page_size, edge = (size + tile_edge - 1) / tile_edge;
-    job->tiles = lx_calloc_array((size_t)edge * edge * bake->atlas->page_count, sizeof *job->tiles);
-    if (!job->tiles) return lx_fail_memory(error, "tiles");
-    for (uint32_t page = 0; page < bake->atlas->page_count; ++page)
-        for (uint32_t y = 0; y < size; y += tile_edge)
-            for (uint32_t x = 0; x < size; x += tile_edge) {
-                luxel_tile t = {.page = page, .x = x, .y = y};
-                t.texel_count = (float)collect_texels(job, &t, &job->scratch[0]);
-                if (t.texel_count > 0) job->tiles[job->tile_count++] = t;
-            }
-    return LX_OK;
-}
-
-static lx_result create_scratch(bake_job *job, uint32_t workers, lx_error *error)
-{
-    job->scratch = lx_calloc_array(workers, sizeof *job->scratch);
-    if (!job->scratch) return lx_fail_memory(error, "workers");
-    for (uint32_t i = 0; i < workers; ++i) {
-        tile_scratch *s = &job->scratch[i];
-        s->batch = lx_path_batch_create();
-        s->sums = lx_calloc_array((size_t)tile_edge * tile_edge * job->bake->layer_count * 3, sizeof *s->sums);
-        s->sites = lx_calloc_array((size_t)tile_edge * tile_edge * lx_site_count, sizeof *s->sites);
-        if (!s->batch || !s->sums || !s->sites) return lx_fail_memory(error, "workers");
-    }
-    return LX_OK;
-}
-
-static void release_job(bake_job *job, uint32_t workers)
-{
-    for (uint32_t i = 0; job->scratch && i < workers; ++i) {
-        lx_path_batch_destroy(job->scratch[i].batch);
-        lx_free(job->scratch[i].sums);
-        lx_free(job->scratch[i].sites);
-    }
-    for (uint32_t i = 0; job->pages && i < job->bake->atlas->page_count; ++i) lx_luxels_release(&job->pages[i]);
-    lx_free(job->scratch);
-    lx_free(job->pages);
-    lx_free(job->tiles);
+    const lx_atlas *atlas = bake->atlas;
+    lx_pool *pool = bake->scene->context->pool;
+    LX_TRY(lx_pool_run(pool, atlas->page_count, rasterise_page, job, "luxels", job->progress, error));
+    LX_TRY(lx_bake_map_build(atlas->page_size, atlas->page_count, bake->texel_chart, bake->texel_coverage, &job->map, error));
+    job->tile_weights = lx_malloc_array(job->map.tile_count, sizeof *job->tile_weights);
+    if (!job->tile_weights) return lx_fail_memory(error, "tiles");
+    for (uint32_t i = 0; i < job->map.tile_count; ++i) job->tile_weights[i] = (float)job->map.tiles[i].count;
+    LX_TRY(lx_pool_run_weighted(pool, job->map.tile_count, job->tile_weights, settle_tile, job, "luxels", job->progress, error));
+cleanup:
+    return result;
 }
 
 // Fills padding and invalid texels of one page in all layers.
 static lx_result fill_page(void *user, size_t page, uint32_t worker, lx_error *error)
 {
     (void)worker;
-    bake_job *job = user;
+    lx_bake_job *job = user;
     lx_bake *bake = job->bake;
     const uint32_t size = bake->atlas->page_size;
     const size_t texel_count = (size_t)size * size;
@@ -300,41 +195,55 @@ static double lap(double *start)
     return seconds;
 }
 
-static void summarise(bake_job *job, uint32_t workers, double start)
+static void summarise(const lx_bake_job *job, double start)
 {
     lx_bake *bake = job->bake;
-    const size_t page_texels = (size_t)bake->atlas->page_size * bake->atlas->page_size, total = page_texels * bake->atlas->page_count;
+    const lx_luxel_map *map = &job->map.view;
     lx_bake_summary *s = &bake->summary;
     *s = (lx_bake_summary){.page_count = bake->atlas->page_count, .page_size = bake->atlas->page_size,
-                           .layer_count = bake->layer_count, .source_count = bake->source_count,
-                           .texels_per_m = bake->atlas->texels_per_m, .stages = job->stages};
-    for (size_t i = 0; i < total; ++i) {
-        s->texel_count += bake->texel_coverage[i] != 0;
-        s->invalid_count += bake->texel_coverage[i] && !lx_luxel_is_valid(&job->pages[i / page_texels], (uint32_t)(i % page_texels));
-    }
-    s->coverage = (float)((double)s->texel_count / (double)total);
+                           .layer_count = bake->layer_count, .source_count = bake->source_count, .texel_count = map->count,
+                           .texels_per_m = bake->atlas->texels_per_m, .stages = job->stages, .ray_count = job->ray_count,
+                           .noise = job->noise, .group_count = job->group_count};
+    for (uint32_t i = 0; i < map->count; ++i) s->invalid_count += !map->valid[i];
+    const double total = (double)map->page_size * map->page_size * map->page_count;
+    s->coverage = total > 0 ? (float)((double)s->texel_count / total) : 0;
     s->path_count = s->texel_count * bake->desc.samples;
-    for (uint32_t i = 0; i < workers; ++i) s->ray_count += lx_path_batch_rays(job->scratch[i].batch);
     s->seconds = lx_seconds() - start;
 }
 
 // A few places of the first tile of each page stand for all.
-static void check_sum_of_layers(const bake_job *job)
+static lx_result check_sum_of_layers(const lx_bake_job *job, lx_error *error)
 {
     enum { points_per_page = 16 };
     lx_receiver points[points_per_page];
+    if (job->bake->desc.combined) return LX_OK;
+    lx_path_batch *batch = lx_path_batch_create();
+    if (!batch) return lx_fail_memory(error, "bake");
     uint32_t last_page = UINT32_MAX;
-    for (size_t i = 0; i < job->tile_count && !job->bake->desc.combined; ++i) {
-        const luxel_tile *tile = &job->tiles[i];
+    for (uint32_t i = 0; i < job->map.tile_count; ++i) {
+        const lx_luxel_tile *tile = &job->map.tiles[i];
         if (tile->page == last_page) continue;
         last_page = tile->page;
-        tile_scratch *s = &job->scratch[0];
-        const uint32_t texels = collect_texels(job, tile, s), count = texels < points_per_page ? texels : points_per_page;
-        for (uint32_t k = 0; k < count; ++k) {
-            lx_luxel_sites(job->bake, &job->pages[tile->page], s->texels[k * texels / count], 0, 1, &points[k]);
+        const uint32_t wanted = tile->count < points_per_page ? tile->count : points_per_page;
+        uint32_t count = 0;
+        for (uint32_t k = 0; k < wanted; ++k) {
+            const uint32_t luxel = tile->first + k * tile->count / wanted;
+            uint32_t texel;
+            const lx_luxel_page *page = lx_job_page(job, luxel, &texel);
+            if (job->map.valid[luxel]) lx_luxel_sites(job->bake, page, texel, 0, 1, &points[count++]);
         }
-        lx_layers_check(job->bake, s->batch, points, count);
+        lx_layers_check(job->bake, batch, points, count);
     }
+    lx_path_batch_destroy(batch);
+    return LX_OK;
+}
+
+static void release_job(lx_bake_job *job)
+{
+    for (uint32_t i = 0; job->pages && i < job->bake->atlas->page_count; ++i) lx_luxels_release(&job->pages[i]);
+    lx_free(job->pages);
+    lx_bake_map_release(&job->map);
+    lx_free(job->tile_weights);
 }
 
 lx_result lx_bake_run(lx_bake *bake, const lx_progress_sink *progress, lx_error *error)
@@ -344,38 +253,23 @@ lx_result lx_bake_run(lx_bake *bake, const lx_progress_sink *progress, lx_error 
     double stage_start = start;
     const lx_atlas *atlas = bake->atlas;
     lx_pool *pool = bake->scene->context->pool;
-    const uint32_t workers = lx_pool_worker_count(pool), samples = bake->desc.samples;
-    float *weights = NULL;
-    bake_job job = {.bake = bake, .stages = {.import = bake->scene->import_seconds, .unwrap = atlas->seconds}, .site_count = samples < lx_site_count ? samples : (uint32_t)lx_site_count};
-    job.settings = (lx_path_settings){.tracer = bake->tracer, .uses = bake->uses, .layer_count = bake->layer_count,
-                                      .bounces = bake->desc.direct_only ? 0 : bake->desc.transport.bounces,
-                                      .direct = !bake->desc.indirect_only, .indirect = !bake->desc.direct_only};
+    lx_bake_job job = {.bake = bake, .progress = progress, .stages = {.import = bake->scene->import_seconds, .unwrap = atlas->seconds}};
     job.pages = lx_calloc_array(atlas->page_count, sizeof *job.pages);
-    if (!job.pages) {
-        result = lx_fail_memory(error, "luxels");
-        goto cleanup;
-    }
-    LX_TRY(create_scratch(&job, workers, error));
+    if (!job.pages) return lx_fail_memory(error, "luxels");
     lx_advise_on_scene(bake);
-    LX_TRY(lx_pool_run(pool, atlas->page_count, rasterise_page, &job, "luxels", progress, error));
-    LX_TRY(list_tiles(&job, error));
-    weights = lx_malloc_array(job.tile_count, sizeof *weights);
-    if (!weights) {
-        result = lx_fail_memory(error, "tiles");
-        goto cleanup;
-    }
-    for (size_t i = 0; i < job.tile_count; ++i) weights[i] = job.tiles[i].texel_count;
-    LX_TRY(lx_pool_run_weighted(pool, job.tile_count, weights, settle_tile, &job, "luxels", progress, error));
+    LX_TRY(place_luxels(&job, error));
     job.stages.luxels = lap(&stage_start);
-    LX_TRY(lx_pool_run_weighted(pool, job.tile_count, weights, bake_tile, &job, "bake", progress, error));
+    if (bake->desc.integrator == LX_INTEGRATOR_PATH)
+        LX_TRY(lx_bake_by_paths(&job, error));
+    else
+        LX_TRY(lx_bake_by_gathering(&job, error));
     job.stages.bake = lap(&stage_start);
     LX_TRY(lx_pool_run(pool, atlas->page_count, fill_page, &job, "post", progress, error));
     job.stages.post = lap(&stage_start);
-    summarise(&job, workers, start);
-    check_sum_of_layers(&job);
+    summarise(&job, start);
+    LX_TRY(check_sum_of_layers(&job, error));
     lx_advise_on_layers(bake);
 cleanup:
-    release_job(&job, workers);
-    lx_free(weights);
+    release_job(&job);
     return result;
 }

@@ -166,3 +166,20 @@ void lx_luxel_sites(const lx_bake *bake, const lx_luxel_page *page, uint32_t tex
         if (settled) out[i].position = settled->position[first + i];
     }
 }
+
+float lx_luxel_size(const lx_bake *bake, const lx_luxel_page *page, uint32_t texel)
+{
+    lx_texel t;
+    lx_texel_open(&t, bake, page, texel);
+    return t.fragment_count > 0 ? lx_texel_piece(&t, 0)->texel_m : 0;
+}
+
+lx_vec2 lx_piece_barycentrics(const lx_piece *piece, lx_vec3 place)
+{
+    const lx_vec3 e1 = lx_sub(piece->world[1], piece->world[0]), e2 = lx_sub(piece->world[2], piece->world[0]);
+    const lx_vec3 d = lx_sub(place, piece->world[0]), n = lx_cross(e1, e2);
+    const float square = lx_dot(n, n);
+    if (!(square > 0)) return (lx_vec2){0, 0};
+    const float u = lx_clamp(lx_dot(lx_cross(d, e2), n) / square, 0, 1);
+    return (lx_vec2){u, lx_clamp(lx_dot(lx_cross(e1, d), n) / square, 0, 1 - u)};
+}

@@ -33,6 +33,12 @@ const lx_piece *lx_texel_piece(lx_texel *t, uint32_t fragment);
 /// A place on a piece's triangle, in the world.
 lx_vec3 lx_piece_point(const lx_piece *piece, lx_point on_page);
 
+/// Edge of the texel on its surface, metres.
+float lx_luxel_size(const lx_bake *bake, const lx_luxel_page *page, uint32_t texel);
+
+/// Where a place near the piece lies on its triangle: barycentrics of the second and third corner.
+lx_vec2 lx_piece_barycentrics(const lx_piece *piece, lx_vec3 place);
+
 /// Site `number` as it falls. Returns the piece it lies on.
 const lx_piece *lx_texel_site(lx_texel *t, uint32_t number, lx_receiver *out);
 

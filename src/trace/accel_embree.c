@@ -228,8 +228,9 @@ static lx_hit intersect_one(const lx_accel *accel, ray_context *context, const l
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
     rtcIntersect1(accel->scene, &context->embree, &query);
+    const float along = query.hit.Ng_x * ray->direction.x + query.hit.Ng_y * ray->direction.y + query.hit.Ng_z * ray->direction.z;
     return (lx_hit){.surface = query.hit.geomID, .triangle = query.hit.primID, .t = query.ray.tfar, .u = query.hit.u,
-                    .v = query.hit.v};
+                    .v = query.hit.v, .back = along > 0};
 }
 
 void lx_accel_closest(const lx_accel *accel, const lx_ray *rays, lx_hit *hits, size_t count)

@@ -26,7 +26,7 @@ typedef struct lx_direct_settings {
 
 /// Working memory of one worker.
 typedef struct lx_direct_batch lx_direct_batch;
-lx_direct_batch *lx_direct_batch_create(void);
+lx_direct_batch *lx_direct_batch_create(const lx_tracer *tracer); ///< NULL: no memory.
 void lx_direct_batch_destroy(lx_direct_batch *batch);
 uint64_t lx_direct_batch_rays(const lx_direct_batch *batch);
 

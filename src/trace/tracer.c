@@ -155,6 +155,7 @@ static lx_result build_surfaces(lx_tracer *tracer, bool include_dynamic, lx_erro
         lx_traced_surface *out = &tracer->surfaces[i];
         out->kind = classify(scene, s);
         out->orientation = lx_mat4_determinant3(instance->transform) < 0 ? -1.0f : 1.0f;
+        tracer->any_mirrored |= out->orientation < 0;
         if (!instance->is_static && !include_dynamic) continue;
         out->positions = next;
         for (uint32_t v = 0; v < primitive->vertex_count; ++v)
@@ -399,6 +400,9 @@ const char *lx_tracer_isa(const lx_tracer *tracer)
 void lx_trace_closest(const lx_tracer *tracer, const lx_ray *rays, lx_hit *hits, size_t count)
 {
     lx_accel_closest(tracer->accel, rays, hits, count);
+    if (!tracer->any_mirrored) return;
+    for (size_t i = 0; i < count; ++i)
+        if (hits[i].surface != LX_MISS && tracer->surfaces[hits[i].surface].orientation < 0) hits[i].back = !hits[i].back;
 }
 
 void lx_trace_transmittance(const lx_tracer *tracer, const lx_ray *rays, lx_rgb *transmittance, size_t count)
@@ -484,6 +488,11 @@ lx_vec3 lx_normal_at(const lx_tracer *tracer, uint32_t surface, uint32_t triangl
     lx_triangle_corners(tracer, surface, triangle, corners);
     const surface_point p = point_of(tracer, surface, triangle, u, v);
     return interpolated_normal(tracer, surface, &p, geometric_normal(tracer, surface, corners));
+}
+
+bool lx_surface_is_plain(const lx_tracer *tracer, uint32_t surface)
+{
+    return tracer->surfaces[surface].kind == LX_SURFACE_OPAQUE && tracer->scene->surfaces[surface].source < 0;
 }
 
 bool lx_surface_is_double_sided(const lx_tracer *tracer, uint32_t surface)

@@ -22,6 +22,7 @@ typedef struct lx_hit {
     uint32_t triangle; ///< Of the surface's primitive.
     float t;
     float u, v;        ///< Barycentrics: position = (1-u-v) p0 + u p1 + v p2 over the primitive's corners in index order.
+    bool back;         ///< The ray came to the back side.
 } lx_hit;
 
 /// A hit as light transport sees it (spec: surfaces). Colours are linear.
@@ -88,6 +89,8 @@ bool lx_triangle_normals(const lx_tracer *tracer, uint32_t surface, uint32_t tri
 lx_vec3 lx_normal_at(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, float u, float v);
 /// Does the surface shine or shade from its back too?
 bool lx_surface_is_double_sided(const lx_tracer *tracer, uint32_t surface);
+/// Is a hit on its front (or on its back, which is black unless it is double-sided) all there is to know of it: opaque, and no light source?
+bool lx_surface_is_plain(const lx_tracer *tracer, uint32_t surface);
 /// Has the surface an inside behind it? Opaque ones with one side have; panes, cutouts and sheets with two sides don't.
 bool lx_surface_is_solid(const lx_tracer *tracer, uint32_t surface);
 

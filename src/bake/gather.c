@@ -1,0 +1,674 @@
+// All layers and all bounces for the price of one gather ray: [transport 4] in docs/architecture.md.
+//
+// 1. Direct light of every luxel and layer by shadow rays (trace/direct.h), and some cosine-weighted rays a luxel, traced once: what they hit is kept.
+// 2. Passes: radiosity of every luxel <- albedo × (direct light + mean over its rays of the radiosity there), for all layers at once: a sparse matrix
+//    times a dense one. One more pass is one more bounce.
+// 3. Final gather: many more rays, in rounds; they read the radiosity where they hit. Half of a round against the other tells how sure the mean is; tiles where
+//    every layer is sure enough take part in no further round, and a layer that is sure enough stays as it is while others go on.
+//
+// Rays never depend on light, so a layer's texels depend on its own sources alone. (Light samples at near hits are drawn per source.)
+#include "bake/bake_job.h"
+
+#include "bake/gather_rays.h"
+#include "bake/texel_sites.h"
+#include "base/clock.h"
+#include "base/error.h"
+#include "math/hash.h"
+#include "trace/direct.h"
+#include "trace/tracer_data.h"
+
+#include <string.h>
+
+enum {
+    tile_luxels = lx_luxel_tile_edge * lx_luxel_tile_edge,
+    chunk_luxels = 256,    // of a tile, whose sums are at work at a time
+    first_round = 16,      // rays a luxel
+    largest_round = 256,
+    rays_per_site = 4,     // in a round
+    most_pass_rays = 32,
+    most_passes = 1000,
+};
+
+static const float near_texels = 1.0f;
+static const double enough_energy = 1e-3; // of a layer's: what later bounces may still have added
+static const float darkest = 0.01f;      // of a layer's mean: below it errors count as if the texel were that bright
+static const uint32_t cache_stream = 0x63616368;
+
+typedef struct gather_scratch {
+    lx_gather_batch *batch;
+    lx_direct_batch *direct;
+    lx_receiver *sites;     // [tile_luxels][lx_site_count]
+    lx_gather_start *starts; // [chunk_luxels × rays of a round at most]
+    float *sums;            // [2][chunk_luxels][3][row_layers], or [tile_luxels][3][row_layers]
+    lx_rgb *mean;           // [cells][tile_luxels] of one source
+    float *variance;
+    uint32_t *found;        // [tile_luxels][most_pass_rays]
+    uint32_t back_hits[tile_luxels];
+    uint32_t stream[tile_luxels], chart[tile_luxels];
+    uint16_t place[tile_luxels];
+    uint32_t luxel[tile_luxels]; // of the map
+    uint32_t count;              // valid luxels of the tile
+} gather_scratch;
+
+// What a round knows of a tile.
+typedef struct tile_state {
+    bool done;
+    uint32_t *samples; // [layer] rays that went into the layer's estimates; a layer that is done keeps its number
+    uint8_t *frozen;   // [layer]
+} tile_state;
+
+typedef struct gather_job {
+    lx_bake_job *job;
+    const lx_bake *bake;
+    const lx_source_use *uses;
+    uint32_t first_layer, layer_count, row_layers;
+    size_t stride;          // values of a row
+    uint32_t luxel_count;
+    lx_lookup lookup;
+    float *scales;          // [row_layers]
+    float *authored;        // [layer_count] mean channel of c
+    lx_rgb *albedo;         // [luxel]
+    uint16_t *light;        // [luxel][3][row_layers] direct light and what the cache's rays met of sources
+    uint16_t *rows[2];      // [luxel][3][row_layers] radiosity; [1] the pass before
+    uint32_t pass_rays;
+    uint32_t *hits;         // [luxel][pass_rays]
+    lx_gather_extras *extras; // [tile]; targets are luxels of the tile
+    lx_estimate *direct, *indirect; // [layer][luxel]
+    double *pass_change, *pass_energy; // [tile][layer]
+    uint8_t *converged;     // [layer] needs no more passes
+    tile_state *tiles;
+    float *layer_means;     // [layer_count]
+    double *sum_ratio;      // [tile][2]: variance of the sum over layers, and the sum of the layers' variances, of the first round
+    gather_scratch *scratch; // [worker]
+    uint32_t round_first, round_count; // samples of the round
+    lx_gather_settings settings;
+} gather_job;
+
+// ---- tiles -----------------------------------------------------------------------------------------------------------------------
+
+static uint32_t max_cells(const gather_job *g)
+{
+    uint32_t most = 1;
+    for (uint32_t s = 0; s < g->bake->source_count; ++s) {
+        const uint32_t cells = lx_tracer_cell_count(g->bake->tracer, s);
+        if (cells > most) most = cells;
+    }
+    return most;
+}
+
+// Valid luxels of a tile.
+static void list_luxels(const gather_job *g, const lx_luxel_tile *tile, gather_scratch *s)
+{
+    const lx_luxel_map *map = &g->job->map.view;
+    s->count = 0;
+    for (uint32_t i = tile->first; i < tile->first + tile->count; ++i) {
+        if (!map->valid[i]) continue;
+        uint32_t texel;
+        const lx_luxel_page *page = lx_job_page(g->job, i, &texel);
+        s->luxel[s->count] = i;
+        s->chart[s->count] = map->chart[i];
+        s->stream[s->count] = lx_luxel_stream(g->bake, page, texel);
+        s->place[s->count++] = (uint16_t)((lx_luxel_y(map, i) - tile->y) * lx_luxel_tile_edge + lx_luxel_x(map, i) - tile->x);
+    }
+}
+
+static void place_sites(const gather_job *g, const gather_scratch *s, uint32_t index, uint32_t first, uint32_t count, lx_receiver *out)
+{
+    uint32_t texel;
+    const lx_luxel_page *page = lx_job_page(g->job, s->luxel[index], &texel);
+    lx_luxel_sites(g->bake, page, texel, first, count, out);
+}
+
+// Mean albedo of a luxel: what its row is multiplied by. Hits that are looked up lie farther than a texel, where no finer detail can be told.
+static lx_rgb mean_albedo(const gather_job *g, uint32_t luxel)
+{
+    enum { places = 8 };
+    uint32_t texel;
+    const lx_luxel_page *page = lx_job_page(g->job, luxel, &texel);
+    lx_texel t;
+    lx_texel_open(&t, g->bake, page, texel);
+    lx_ray rays[places];
+    lx_hit hits[places];
+    lx_shading shading[places];
+    for (uint32_t k = 0; k < places; ++k) {
+        lx_receiver r;
+        const lx_piece *piece = lx_texel_site(&t, k * (lx_site_count / places), &r);
+        const lx_fragment *f = &t.fragments[piece->fragment];
+        const lx_vec2 b = lx_piece_barycentrics(piece, r.position);
+        rays[k] = (lx_ray){.origin = r.position, .direction = lx_neg(r.geometric_normal), .t_max = 1};
+        hits[k] = (lx_hit){.surface = f->surface, .triangle = f->triangle, .u = b.x, .v = b.y};
+    }
+    lx_shade_hits(g->bake->tracer, rays, hits, shading, places);
+    lx_rgb sum = {0, 0, 0};
+    for (uint32_t k = 0; k < places; ++k) sum = lx_rgb_add(sum, shading[k].albedo);
+    return lx_rgb_scale(sum, 1.0f / places);
+}
+
+// ---- direct light and the cache's rays -----------------------------------------------------------------------------------------------
+
+// Adds a source's direct light to its layers: to the estimates if it counts there, to the cache's rows always.
+static void add_source(const gather_job *g, gather_scratch *s, uint32_t source, bool counts)
+{
+    const lx_source_use *use = &g->uses[source];
+    const uint32_t cells = lx_tracer_cell_count(g->bake->tracer, source);
+    const float least = (use->weight.r + use->weight.g + use->weight.b) / 3;
+    for (uint32_t cell = 0; cell < cells; ++cell) {
+        const uint32_t layer = (uint32_t)use->layer + (use->cells ? 0 : cell);
+        const lx_rgb weight = use->cells ? lx_rgb_mul(use->weight, use->cells[cell]) : use->weight;
+        const float grey = use->cells ? (weight.r + weight.g + weight.b) / 3 : least;
+        const float unit = g->scales[layer];
+        lx_estimate *estimates = g->direct + (size_t)layer * g->luxel_count;
+        for (uint32_t i = 0; i < s->count; ++i) {
+            const lx_rgb e = lx_rgb_mul(s->mean[(size_t)cell * s->count + i], weight);
+            float *row = s->sums + g->stride * i + layer;
+            row[0] += e.r * unit;
+            row[g->row_layers] += e.g * unit;
+            row[2 * g->row_layers] += e.b * unit;
+            if (!counts) continue;
+            lx_estimate *estimate = &estimates[s->luxel[i]];
+            estimate->mean = lx_rgb_add(estimate->mean, e);
+            estimate->variance += s->variance[(size_t)cell * s->count + i] * grey * grey;
+        }
+    }
+}
+
+static lx_result light_tile(void *user, size_t task, uint32_t worker, lx_error *error)
+{
+    const gather_job *g = user;
+    const lx_bake_desc *desc = &g->bake->desc;
+    const lx_luxel_tile *tile = &g->job->map.tiles[task];
+    gather_scratch *s = &g->scratch[worker];
+    list_luxels(g, tile, s);
+    for (uint32_t i = 0; i < s->count; ++i) place_sites(g, s, i, 0, lx_site_count, s->sites + (size_t)i * lx_site_count);
+    memset(s->sums, 0, sizeof(float) * g->stride * s->count);
+    const lx_direct_tile direct = {.count = s->count, .place = s->place, .chart = s->chart, .stream = s->stream, .sites = s->sites};
+    const lx_direct_settings settings = {.tracer = g->bake->tracer, .samples = (desc->samples + lx_direct_sites - 1) / lx_direct_sites * lx_direct_sites};
+    const bool bounces = g->settings.bounces > 0;
+    for (uint32_t source = 0; source < g->bake->source_count; ++source) {
+        const lx_source_use *use = &g->uses[source];
+        const bool counts = use->direct && !desc->indirect_only;
+        if (use->layer < 0 || (!counts && !bounces)) continue;
+        if (lx_pool_is_stopping(g->bake->scene->context->pool)) return LX_OK;
+        if (lx_direct_light(s->direct, &settings, &direct, source, s->mean, s->variance)) add_source(g, s, source, counts);
+    }
+    if (!bounces) return LX_OK;
+
+    // What the sums hold so far is light × scale; what rays add is 1 / LX_ROW_UNIT of it, for each ray.
+    const float ray_unit = LX_ROW_UNIT / (float)g->pass_rays;
+    for (size_t i = 0; i < g->stride * s->count; ++i) s->sums[i] *= 1 / ray_unit;
+    const lx_gather_settings ray_settings = {.tracer = g->bake->tracer, .lookup = &g->lookup, .uses = g->uses, .scales = g->scales,
+                                             .row_layers = g->row_layers, .bounces = g->settings.bounces, .everything = true};
+    memset(s->back_hits, 0, sizeof s->back_hits);
+    for (uint32_t first = 0; first < s->count; first += chunk_luxels) {
+        const uint32_t end = first + chunk_luxels < s->count ? first + chunk_luxels : s->count;
+        size_t count = 0;
+        for (uint32_t i = first; i < end; ++i)
+            for (uint32_t k = 0; k < g->pass_rays; ++k)
+                s->starts[count++] = (lx_gather_start){.receiver = &s->sites[i * lx_site_count + k % lx_site_count],
+                                                       .stream = s->stream[i] ^ cache_stream, .sample = k, .target = i};
+        const lx_gather_output out = {.sums = s->sums, .back_hits = s->back_hits, .luxels = s->found, .extras = &g->extras[task]};
+        const lx_result result = lx_gather_trace(s->batch, &ray_settings, s->starts, count, &out, error);
+        if (result != LX_OK) return result;
+        for (uint32_t i = first; i < end; ++i)
+            memcpy(g->hits + (size_t)s->luxel[i] * g->pass_rays, s->found + (size_t)(i - first) * g->pass_rays, g->pass_rays * sizeof *g->hits);
+    }
+    for (uint32_t i = 0; i < s->count; ++i) {
+        const lx_rgb albedo = mean_albedo(g, s->luxel[i]);
+        g->albedo[s->luxel[i]] = albedo;
+        const float channel[3] = {albedo.r, albedo.g, albedo.b};
+        uint16_t *light = g->light + g->stride * s->luxel[i], *row = g->rows[0] + g->stride * s->luxel[i];
+        for (size_t c = 0; c < 3; ++c)
+            for (size_t l = c * g->row_layers; l < (c + 1) * g->row_layers; ++l) {
+                const float value = s->sums[g->stride * i + l] * ray_unit;
+                light[l] = lx_row_encode(value);
+                row[l] = lx_row_encode(channel[c] * value);
+            }
+    }
+    // From numbers within the tile's list to luxels.
+    for (size_t k = 0; k < g->extras[task].count; ++k) g->extras[task].items[k].target = s->luxel[g->extras[task].items[k].target];
+    return LX_OK;
+}
+
+// ---- passes -------------------------------------------------------------------------------------------------------------------------
+
+// Extras of a tile lie in the order in which paths ended; they are added after the luxel's plain hits, luxel by luxel.
+static int compare_extras(const void *a, const void *b)
+{
+    const lx_gather_extra *x = a, *y = b;
+    if (x->target != y->target) return x->target < y->target ? -1 : 1;
+    if (x->luxel != y->luxel) return x->luxel < y->luxel ? -1 : 1;
+    return memcmp(&x->weight, &y->weight, sizeof x->weight);
+}
+
+static lx_result sort_extras(void *user, size_t task, uint32_t worker, lx_error *error)
+{
+    (void)worker;
+    (void)error;
+    const gather_job *g = user;
+    if (g->extras[task].count) qsort(g->extras[task].items, g->extras[task].count, sizeof *g->extras[task].items, compare_extras);
+    return LX_OK;
+}
+
+static lx_result pass_tile(void *user, size_t task, uint32_t worker, lx_error *error)
+{
+    (void)error;
+    const gather_job *g = user;
+    const lx_luxel_tile *tile = &g->job->map.tiles[task];
+    const uint16_t *from = g->rows[0];
+    float *sums = g->scratch[worker].sums;
+    double *change = g->pass_change + task * g->layer_count, *energy = g->pass_energy + task * g->layer_count;
+    memset(change, 0, g->layer_count * sizeof *change);
+    memset(energy, 0, g->layer_count * sizeof *energy);
+    const lx_gather_extras *extras = &g->extras[task];
+    size_t extra = 0;
+    const float unit = 1 / (float)g->pass_rays;
+    for (uint32_t i = tile->first; i < tile->first + tile->count; ++i) {
+        if (!g->job->map.valid[i]) continue;
+        memset(sums, 0, g->stride * sizeof *sums);
+        const uint32_t *hits = g->hits + (size_t)i * g->pass_rays;
+        for (uint32_t k = 0; k < g->pass_rays; ++k)
+            if (hits[k] != LX_NO_LUXEL) __builtin_prefetch(from + g->stride * hits[k]);
+        for (uint32_t k = 0; k < g->pass_rays; ++k)
+            if (hits[k] != LX_NO_LUXEL) lx_row_add(sums, from + g->stride * hits[k], g->stride);
+        for (; extra < extras->count && extras->items[extra].target == i; ++extra) {
+            const lx_gather_extra *e = &extras->items[extra];
+            const float weight[3] = {e->weight.r, e->weight.g, e->weight.b};
+            lx_row_add_scaled(sums, from + g->stride * e->luxel, g->row_layers, weight);
+        }
+        const uint16_t *light = g->light + g->stride * i, *old = from + g->stride * i;
+        uint16_t *row = g->rows[1] + g->stride * i;
+        const lx_rgb a = g->albedo[i];
+        const float albedo[3] = {a.r * LX_ROW_UNIT, a.g * LX_ROW_UNIT, a.b * LX_ROW_UNIT};
+        for (size_t c = 0; c < 3; ++c)
+            for (size_t l = 0; l < g->layer_count; ++l) {
+                const size_t at = c * g->row_layers + l;
+                if (g->converged[l]) {
+                    row[at] = old[at];
+                    continue;
+                }
+                const float value = albedo[c] * (lx_row_decode_small(light[at]) + sums[at] * unit);
+                row[at] = lx_row_encode(value);
+                change[l] += fabs((double)(value - lx_row_decode_small(old[at]) * LX_ROW_UNIT));
+                energy[l] += (double)value;
+            }
+    }
+    return LX_OK;
+}
+
+// `wanted` bounces beyond the first; LX_BOUNCES_INF: until no layer gains what counts.
+static lx_result run_passes(gather_job *g, uint32_t wanted, lx_error *error)
+{
+    lx_result result = LX_OK;
+    lx_bake_job *job = g->job;
+    lx_pool *pool = g->bake->scene->context->pool;
+    double *last = lx_calloc_array(g->layer_count, sizeof *last);
+    if (!last) return lx_fail_memory(error, "irradiance cache");
+    memset(g->converged, 0, g->layer_count);
+    const uint32_t limit = wanted < most_passes ? wanted : most_passes;
+    for (uint32_t pass = 0; pass < limit; ++pass) {
+        LX_TRY(lx_pool_run_weighted(pool, job->map.tile_count, job->tile_weights, pass_tile, g, "cache", job->progress, error));
+        uint16_t *swap = g->rows[0];
+        g->rows[0] = g->rows[1];
+        g->rows[1] = swap;
+        if (wanted != LX_BOUNCES_INF) continue;
+        bool all = true;
+        for (uint32_t l = 0; l < g->layer_count; ++l) {
+            double change = 0, energy = 0;
+            for (uint32_t t = 0; t < job->map.tile_count; ++t) {
+                change += g->pass_change[(size_t)t * g->layer_count + l];
+                energy += g->pass_energy[(size_t)t * g->layer_count + l];
+            }
+            if (g->converged[l]) continue;
+            // Each bounce is about `ratio` of the one before: what is still to come is the rest of a geometric series.
+            const double ratio = last[l] > 0 ? fmin(change / last[l], 0.999) : 0.9;
+            if (!(change * ratio / (1 - ratio) > enough_energy * energy)) g->converged[l] = 1;
+            last[l] = change;
+            all &= g->converged[l] != 0;
+        }
+        if (all) break;
+    }
+cleanup:
+    lx_free(last);
+    return result;
+}
+
+// ---- final gather ---------------------------------------------------------------------------------------------------------------------
+
+// The round's rays of luxels first … end - 1 of the list; the first half of a luxel's samples and the second have sums of their own.
+static size_t make_starts(const gather_job *g, gather_scratch *s, uint32_t first, uint32_t end)
+{
+    const uint32_t n = g->round_count, half = (n + 1) / 2;
+    size_t count = 0;
+    for (uint32_t i = first; i < end; ++i) {
+        lx_receiver *sites = s->sites + (size_t)(i - first) * lx_site_count;
+        const uint32_t first_site = g->round_first / rays_per_site % lx_site_count;
+        const uint32_t sites_wanted = (n + rays_per_site - 1) / rays_per_site;
+        const uint32_t site_count = sites_wanted < lx_site_count ? sites_wanted : lx_site_count;
+        const uint32_t straight = first_site + site_count <= lx_site_count ? site_count : lx_site_count - first_site;
+        place_sites(g, s, i, first_site, straight, sites);
+        if (straight < site_count) place_sites(g, s, i, 0, site_count - straight, sites + straight);
+        for (uint32_t k = 0; k < n; ++k)
+            s->starts[count++] = (lx_gather_start){.receiver = &sites[k / rays_per_site % site_count], .stream = s->stream[i],
+                                                   .sample = g->round_first + k, .target = (k < half ? 0u : chunk_luxels) + i - first};
+    }
+    return count;
+}
+
+// Takes the round's sums into the estimates of one luxel. Returns what the first round tells of the sum of layers in out_ratio.
+static void fold(const gather_job *g, const tile_state *state, const gather_scratch *s, uint32_t index, uint32_t row, double ratio[2])
+{
+    const uint32_t n = g->round_count, half = (n + 1) / 2;
+    const float *a = s->sums + g->stride * row, *b = s->sums + g->stride * ((size_t)chunk_luxels + row);
+    const size_t luxel = s->luxel[index];
+    double whole = 0, apart = 0;
+    for (uint32_t l = 0; l < g->layer_count; ++l) {
+        if (state->frozen[l]) continue;
+        const float unit = LX_ROW_UNIT / g->scales[l];
+        float mean[3], difference = 0;
+        for (size_t c = 0; c < 3; ++c) {
+            const float x = a[c * g->row_layers + l] * unit, y = b[c * g->row_layers + l] * unit;
+            mean[c] = (x + y) / (float)n;
+            if (n > half) difference += (x / (float)half - y / (float)(n - half)) / 3;
+        }
+        const float before = (float)g->round_first, after = before + (float)n;
+        const float variance = difference * difference / 4;
+        lx_estimate *e = &g->indirect[(size_t)l * g->luxel_count + luxel];
+        e->mean.r = (e->mean.r * before + mean[0] * (float)n) / after;
+        e->mean.g = (e->mean.g * before + mean[1] * (float)n) / after;
+        e->mean.b = (e->mean.b * before + mean[2] * (float)n) / after;
+        e->variance = (e->variance * before * before + variance * (float)n * (float)n) / (after * after);
+        whole += (double)(difference * g->authored[l]);
+        apart += (double)(difference * difference * g->authored[l] * g->authored[l]);
+    }
+    if (g->round_first > 0) return;
+    ratio[0] += whole * whole;
+    ratio[1] += apart;
+}
+
+static float grey(lx_rgb c)
+{
+    return (c.r + c.g + c.b) / 3;
+}
+
+// Root mean square over the tile's luxels of a layer's standard error over its light.
+static double tile_error(const gather_job *g, const gather_scratch *s, uint32_t layer)
+{
+    const lx_estimate *direct = g->direct + (size_t)layer * g->luxel_count, *indirect = g->indirect + (size_t)layer * g->luxel_count;
+    double sum = 0;
+    const float least = darkest * g->layer_means[layer];
+    for (uint32_t i = 0; i < s->count; ++i) {
+        const lx_estimate *d = &direct[s->luxel[i]], *e = &indirect[s->luxel[i]];
+        const float value = lx_max(grey(d->mean) + grey(e->mean), least), variance = d->variance + e->variance;
+        if (variance > 0) sum += (double)variance / ((double)value * (double)value);
+    }
+    return s->count > 0 ? sqrt(sum / s->count) : 0;
+}
+
+static lx_result gather_tile(void *user, size_t task, uint32_t worker, lx_error *error)
+{
+    const gather_job *g = user;
+    const lx_luxel_tile *tile = &g->job->map.tiles[task];
+    tile_state *state = &g->tiles[task];
+    gather_scratch *s = &g->scratch[worker];
+    if (state->done) return LX_OK;
+    list_luxels(g, tile, s);
+    const uint32_t chunk = chunk_luxels;
+    for (uint32_t first = 0; first < s->count; first += chunk) {
+        if (lx_pool_is_stopping(g->bake->scene->context->pool)) return LX_OK;
+        const uint32_t end = first + chunk < s->count ? first + chunk : s->count;
+        memset(s->sums, 0, 2 * chunk_luxels * g->stride * sizeof *s->sums);
+        const size_t count = make_starts(g, s, first, end);
+        const lx_gather_output out = {.sums = s->sums, .back_hits = s->back_hits};
+        const lx_result result = lx_gather_trace(s->batch, &g->settings, s->starts, count, &out, error);
+        if (result != LX_OK) return result;
+        for (uint32_t i = first; i < end; ++i) fold(g, state, s, i, i - first, g->sum_ratio + 2 * task);
+    }
+    for (uint32_t l = 0; l < g->layer_count; ++l)
+        if (!state->frozen[l]) state->samples[l] = g->round_first + g->round_count;
+    return LX_OK;
+}
+
+// After the second round layers begin to be done.
+static lx_result judge_tile(void *user, size_t task, uint32_t worker, lx_error *error)
+{
+    (void)error;
+    const gather_job *g = user;
+    tile_state *state = &g->tiles[task];
+    gather_scratch *s = &g->scratch[worker];
+    if (state->done) return LX_OK;
+    list_luxels(g, &g->job->map.tiles[task], s);
+    bool all = true;
+    for (uint32_t l = 0; l < g->layer_count; ++l) {
+        if (!state->frozen[l] && tile_error(g, s, l) <= (double)g->bake->desc.noise) state->frozen[l] = 1;
+        all &= state->frozen[l] != 0;
+    }
+    state->done = all;
+    return LX_OK;
+}
+
+static void find_layer_means(gather_job *g)
+{
+    const lx_luxel_map *map = &g->job->map.view;
+    for (uint32_t l = 0; l < g->layer_count; ++l) {
+        double sum = 0;
+        uint32_t count = 0;
+        for (uint32_t i = 0; i < map->count; ++i) {
+            if (!map->valid[i]) continue;
+            const size_t at = (size_t)l * g->luxel_count + i;
+            sum += (double)(grey(g->direct[at].mean) + grey(g->indirect[at].mean));
+            ++count;
+        }
+        g->layer_means[l] = count > 0 ? (float)(sum / count) : 0;
+    }
+}
+
+static lx_result run_rounds(gather_job *g, double start, lx_error *error)
+{
+    lx_result result = LX_OK;
+    lx_bake_job *job = g->job;
+    lx_pool *pool = g->bake->scene->context->pool;
+    const lx_bake_desc *desc = &g->bake->desc;
+    for (uint32_t done = 0; done < desc->samples;) {
+        const uint32_t step = done == 0 ? first_round : done < largest_round ? done : largest_round; // cumulative counts are powers of two, for which Sobol points are best spread
+        g->round_first = done;
+        g->round_count = step < desc->samples - done ? step : desc->samples - done;
+        const double round_start = lx_seconds();
+        LX_TRY(lx_pool_run_weighted(pool, job->map.tile_count, job->tile_weights, gather_tile, g, "gather", job->progress, error));
+        done += g->round_count;
+        if (g->round_first == 0) {
+            find_layer_means(g);
+            continue;
+        }
+        if (desc->noise > 0) LX_TRY(lx_pool_run(pool, job->map.tile_count, judge_tile, g, "gather", job->progress, error));
+        const double now = lx_seconds(), next = (now - round_start) * (double)done / (double)g->round_count;
+        if (desc->time_s > 0 && now + next - start > desc->time_s) break;
+        bool all = true;
+        for (uint32_t t = 0; t < job->map.tile_count; ++t) all &= g->tiles[t].done;
+        if (all) break;
+    }
+cleanup:
+    return result;
+}
+
+// ---- the whole ------------------------------------------------------------------------------------------------------------------------
+
+// A power of two that brings the brightest light a layer may give to at most 1: 2^24 times what its sources give the scene on average.
+static void choose_scales(gather_job *g)
+{
+    for (uint32_t l = 0; l < g->row_layers; ++l) g->scales[l] = 0;
+    for (uint32_t s = 0; s < g->bake->source_count; ++s) {
+        const lx_source_use *use = &g->uses[s];
+        if (use->layer < 0) continue;
+        const uint32_t cells = use->cells ? 1 : lx_tracer_cell_count(g->bake->tracer, s);
+        for (uint32_t cell = 0; cell < cells; ++cell)
+            g->scales[(uint32_t)use->layer + cell] += lx_rgb_max(use->weight) * g->bake->tracer->source_scales[s] * 20;
+    }
+    for (uint32_t l = 0; l < g->row_layers; ++l) {
+        int exponent;
+        frexpf(g->scales[l] > 0 && g->scales[l] < INFINITY ? g->scales[l] : 1, &exponent);
+        g->scales[l] = ldexpf(1, -24 - exponent);
+    }
+}
+
+static lx_result create_scratch(gather_job *g, uint32_t workers, uint32_t round_rays, lx_error *error)
+{
+    const size_t sum_rows = tile_luxels > 2 * chunk_luxels ? tile_luxels : 2 * chunk_luxels;
+    const size_t rays = round_rays > most_pass_rays ? round_rays : most_pass_rays, cells = max_cells(g);
+    g->scratch = lx_calloc_array(workers, sizeof *g->scratch);
+    if (!g->scratch) return lx_fail_memory(error, "workers");
+    for (uint32_t i = 0; i < workers; ++i) {
+        gather_scratch *s = &g->scratch[i];
+        s->batch = lx_gather_batch_create();
+        s->direct = lx_direct_batch_create(g->bake->tracer);
+        s->sites = lx_calloc_array((size_t)tile_luxels * lx_site_count, sizeof *s->sites);
+        s->starts = lx_malloc_array(chunk_luxels * rays, sizeof *s->starts);
+        s->sums = lx_malloc_array(sum_rows, g->stride * sizeof *s->sums);
+        s->mean = lx_malloc_array(cells * tile_luxels, sizeof *s->mean);
+        s->variance = lx_malloc_array(cells * tile_luxels, sizeof *s->variance);
+        s->found = lx_malloc_array((size_t)chunk_luxels * most_pass_rays, sizeof *s->found);
+        if (!s->batch || !s->direct || !s->sites || !s->starts || !s->sums || !s->mean || !s->variance || !s->found)
+            return lx_fail_memory(error, "workers");
+    }
+    return LX_OK;
+}
+
+static void release(gather_job *g, uint32_t workers)
+{
+    for (uint32_t i = 0; g->scratch && i < workers; ++i) {
+        gather_scratch *s = &g->scratch[i];
+        if (s->batch) g->job->ray_count += lx_gather_batch_rays(s->batch);
+        if (s->direct) g->job->ray_count += lx_direct_batch_rays(s->direct);
+        lx_gather_batch_destroy(s->batch);
+        lx_direct_batch_destroy(s->direct);
+        lx_free(s->sites);
+        lx_free(s->starts);
+        lx_free(s->sums);
+        lx_free(s->mean);
+        lx_free(s->variance);
+        lx_free(s->found);
+    }
+    lx_free(g->scratch);
+    for (uint32_t t = 0; t < g->job->map.tile_count; ++t) {
+        if (g->extras) lx_free(g->extras[t].items);
+        if (g->tiles) lx_free(g->tiles[t].samples);
+        if (g->tiles) lx_free(g->tiles[t].frozen);
+    }
+    lx_lookup_release(&g->lookup);
+    void *arrays[] = {g->scales, g->authored, g->albedo, g->light, g->rows[0], g->rows[1], g->hits, g->extras, g->direct, g->indirect, g->pass_change,
+                      g->pass_energy, g->converged, g->tiles, g->layer_means, g->sum_ratio};
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) lx_free(arrays[i]);
+}
+
+static lx_result allocate(gather_job *g, lx_error *error)
+{
+    const size_t luxels = g->luxel_count, layers = g->layer_count, tiles = g->job->map.tile_count;
+    const size_t cached = g->settings.bounces > 0 ? luxels : 0;
+    size_t all;
+    if (!lx_mul_size(luxels, layers, &all) || !lx_mul_size(all, 64, &all)) return lx_fail_memory(error, "layers");
+    g->scales = lx_calloc_array(g->row_layers, sizeof *g->scales);
+    g->authored = lx_calloc_array(layers, sizeof *g->authored);
+    g->albedo = lx_calloc_array(cached, sizeof *g->albedo);
+    g->light = lx_calloc_array(cached, g->stride * sizeof *g->light);
+    for (int i = 0; i < 2; ++i) g->rows[i] = lx_calloc_array(cached, g->stride * sizeof *g->rows[i]);
+    g->hits = lx_malloc_array(cached, g->pass_rays * sizeof *g->hits);
+    g->extras = lx_calloc_array(tiles, sizeof *g->extras);
+    g->direct = lx_calloc_array(luxels, layers * sizeof *g->direct);
+    g->indirect = lx_calloc_array(luxels, layers * sizeof *g->indirect);
+    g->pass_change = lx_calloc_array(tiles, layers * sizeof *g->pass_change);
+    g->pass_energy = lx_calloc_array(tiles, layers * sizeof *g->pass_energy);
+    g->converged = lx_calloc_array(layers, 1);
+    g->tiles = lx_calloc_array(tiles, sizeof *g->tiles);
+    g->layer_means = lx_calloc_array(layers, sizeof *g->layer_means);
+    g->sum_ratio = lx_calloc_array(tiles, 2 * sizeof *g->sum_ratio);
+    if (!g->scales || !g->authored || !g->albedo || !g->light || !g->rows[0] || !g->rows[1] || !g->hits || !g->extras || !g->direct || !g->indirect ||
+        !g->pass_change || !g->pass_energy || !g->converged || !g->tiles || !g->layer_means || !g->sum_ratio)
+        return lx_fail_memory(error, "layers; --memory bakes them in groups");
+    for (size_t t = 0; t < tiles; ++t) {
+        g->tiles[t].samples = lx_calloc_array(layers, sizeof *g->tiles[t].samples);
+        g->tiles[t].frozen = lx_calloc_array(layers, 1);
+        if (!g->tiles[t].samples || !g->tiles[t].frozen) return lx_fail_memory(error, "layers");
+    }
+    return LX_OK;
+}
+
+static void store_layers(const gather_job *g)
+{
+    const lx_luxel_map *map = &g->job->map.view;
+    const size_t page_texels = (size_t)map->page_size * map->page_size;
+    for (uint32_t l = 0; l < g->layer_count; ++l)
+        for (uint32_t i = 0; i < map->count; ++i) {
+            const size_t at = (size_t)l * g->luxel_count + i;
+            const lx_rgb e = lx_rgb_add(g->direct[at].mean, g->indirect[at].mean);
+            float *out = lx_bake_image(g->bake, (uint32_t)(map->texel[i] / page_texels), g->first_layer + l) + 3 * (map->texel[i] % page_texels);
+            out[0] = e.r;
+            out[1] = e.g;
+            out[2] = e.b;
+        }
+}
+
+// Relative standard error of the sum at authored colours. Layers share their rays, so their errors go together: the first round told how much.
+static float estimate_noise(const gather_job *g)
+{
+    const lx_luxel_map *map = &g->job->map.view;
+    double whole = 0, apart = 0, mean = 0, sum = 0;
+    uint32_t count = 0;
+    for (uint32_t t = 0; t < g->job->map.tile_count; ++t) {
+        whole += g->sum_ratio[2 * t];
+        apart += g->sum_ratio[2 * t + 1];
+    }
+    const double together = apart > 0 ? whole / apart : 1;
+    for (uint32_t l = 0; l < g->layer_count; ++l) mean += (double)(g->authored[l] * g->layer_means[l]);
+    for (uint32_t i = 0; i < map->count; ++i) {
+        if (!map->valid[i]) continue;
+        double value = 0, variance = 0;
+        for (uint32_t l = 0; l < g->layer_count; ++l) {
+            const size_t at = (size_t)l * g->luxel_count + i;
+            const double c = (double)g->authored[l];
+            value += c * (double)(grey(g->direct[at].mean) + grey(g->indirect[at].mean));
+            variance += c * c * ((double)g->direct[at].variance + together * (double)g->indirect[at].variance);
+        }
+        value = fmax(value, (double)darkest * mean);
+        if (value > 0) sum += variance / (value * value);
+        ++count;
+    }
+    return count > 0 ? (float)sqrt(sum / count) : 0;
+}
+
+lx_result lx_bake_by_gathering(lx_bake_job *job, lx_error *error)
+{
+    lx_result result = LX_OK;
+    const double start = lx_seconds();
+    lx_bake *bake = job->bake;
+    lx_pool *pool = bake->scene->context->pool;
+    const uint32_t workers = lx_pool_worker_count(pool), samples = bake->desc.samples;
+    const uint32_t bounces = bake->desc.direct_only ? 0 : bake->desc.transport.bounces;
+    gather_job g = {.job = job, .bake = bake, .uses = bake->uses, .layer_count = bake->layer_count, .row_layers = lx_row_layers(bake->layer_count),
+                    .luxel_count = job->map.view.count, .pass_rays = samples < 128 ? 16 : most_pass_rays};
+    g.stride = 3 * (size_t)g.row_layers;
+    g.settings.bounces = bounces;
+    LX_TRY(allocate(&g, error));
+    for (uint32_t l = 0; l < bake->layer_count; ++l)
+        g.authored[l] = (bake->layers[l].color[0] + bake->layers[l].color[1] + bake->layers[l].color[2]) / 3 * bake->layers[l].intensity;
+    choose_scales(&g);
+    LX_TRY(lx_lookup_create(bake, &job->map.view, &g.lookup, error));
+    lx_lookup_invalidate(&g.lookup, &job->map.view, job->map.valid);
+    LX_TRY(create_scratch(&g, workers, samples < largest_round ? samples : largest_round, error));
+    LX_TRY(lx_pool_run_weighted(pool, job->map.tile_count, job->tile_weights, light_tile, &g, "direct", job->progress, error));
+    if (bounces > 0) {
+        LX_TRY(lx_pool_run(pool, job->map.tile_count, sort_extras, &g, "cache", job->progress, error));
+        LX_TRY(run_passes(&g, bounces == LX_BOUNCES_INF ? bounces : bounces - 1, error));
+    }
+    g.settings = (lx_gather_settings){.tracer = bake->tracer, .lookup = &g.lookup, .uses = g.uses, .scales = g.scales, .row_layers = g.row_layers,
+                                      .bounces = bounces, .direct = !bake->desc.indirect_only, .near_texels = near_texels};
+    if (bounces > 0) {
+        g.settings.rows = g.rows[0];
+        g.settings.rows_later = bounces == LX_BOUNCES_INF ? g.rows[0] : bounces > 1 ? g.rows[1] : NULL;
+    }
+    LX_TRY(run_rounds(&g, start, error));
+    job->noise = estimate_noise(&g);
+    job->group_count = 1;
+    store_layers(&g);
+cleanup:
+    release(&g, workers);
+    return result;
+}

@@ -1,0 +1,405 @@
+// Two loops. The first takes the many: rays whose hit is looked up without shading it. What it cannot decide goes, with its hit, to the second, which
+// shades, follows paths from vertex to vertex, and is as general as the path integrator (trace/path.c), whose estimators it shares.
+#include "bake/gather_rays.h"
+
+#include "base/error.h"
+#include "math/sobol.h"
+#include "trace/direct.h"
+#include "trace/sampling.h"
+#include "trace/tracer_data.h"
+
+enum {
+    batch_size = lx_gather_batch_size,
+    look_ahead = 8,        // rows that are fetched before they are added
+    roulette_from = 3,     // bounces
+    near_until = 4,        // vertices; paths caught in a corner are looked up all the same
+    most_passes = 256,     // surfaces one ray may pass through
+};
+
+// Random dimensions of a vertex. Light samples take theirs from the source's key.
+enum { dimension_bounce = 1, dimension_roulette = 2, dimension_pass = 3 };
+enum { gather_key = 0x67617468 }; // keeps the streams of gather rays apart from those of light samples
+
+typedef struct flight {
+    lx_rgb throughput;
+    float cosine; // at the receiver
+    uint32_t stream, sample, target, start;
+    uint32_t vertex, passes;
+    uint32_t last_surface, last_triangle;
+} flight;
+
+typedef struct vertex_record {
+    lx_receiver receiver;
+    lx_rgb throughput;
+    uint32_t stream, sample, target, start, number;
+} vertex_record;
+
+typedef struct pending {
+    lx_taps taps;
+    uint32_t index; // of the ray in the batch
+} pending;
+
+struct lx_gather_batch {
+    lx_ray rays[batch_size];
+    lx_hit hits[batch_size];
+    float cosines[batch_size];
+    pending pending[batch_size];
+    uint32_t found[batch_size], found_target[batch_size];
+    // The second loop; what arrives while it is full waits for its turn.
+    lx_ray slow_rays[2 * batch_size];
+    lx_hit slow_hits[2 * batch_size];
+    flight flights[2 * batch_size];
+    lx_shading shading[2 * batch_size];
+    size_t slow_count;
+    vertex_record vertices[2 * batch_size];
+    lx_ray shadow_rays[batch_size];
+    lx_rgb light[batch_size], transmittance[batch_size];
+    uint32_t owner[batch_size], cell[batch_size];
+    uint64_t ray_count;
+};
+
+lx_gather_batch *lx_gather_batch_create(void)
+{
+    return lx_calloc_array(1, sizeof(lx_gather_batch));
+}
+
+void lx_gather_batch_destroy(lx_gather_batch *batch)
+{
+    lx_free(batch);
+}
+
+uint64_t lx_gather_batch_rays(const lx_gather_batch *batch)
+{
+    return batch->ray_count;
+}
+
+static uint32_t dimension_key(uint32_t stream, uint32_t vertex, uint32_t dimension)
+{
+    return lx_hash_combine(stream, gather_key + vertex * 4096 + dimension);
+}
+
+// ---- what arrives ---------------------------------------------------------------------------------------------------------------
+
+static void add_light(const lx_gather_settings *settings, const lx_gather_output *out, uint32_t target, const lx_source_use *use, uint32_t cell,
+                      lx_rgb value)
+{
+    const size_t layer = (size_t)use->layer + (use->cells ? 0 : cell), layers = settings->row_layers;
+    if (use->cells) value = lx_rgb_mul(value, use->cells[cell]);
+    const float unit = settings->scales[layer] * (1 / LX_ROW_UNIT);
+    float *sum = out->sums + 3 * layers * target + layer;
+    sum[0] += value.r * use->weight.r * unit;
+    sum[layers] += value.g * use->weight.g * unit;
+    sum[2 * layers] += value.b * use->weight.b * unit;
+}
+
+// Does light that reaches vertex `vertex` straight from a source count?
+static bool counts(const lx_gather_settings *settings, const lx_source_use *use, uint32_t vertex)
+{
+    if (use->layer < 0) return false;
+    return vertex > 0 || settings->everything || (settings->direct && use->direct);
+}
+
+static void add_sky(const lx_gather_settings *settings, const lx_gather_output *out, lx_rgb throughput, float cosine, uint32_t target,
+                    lx_vec3 direction, uint32_t vertex)
+{
+    const lx_tracer *tracer = settings->tracer;
+    if (!tracer->sky.present) return;
+    const lx_source_use *use = &settings->uses[tracer->source_count - 1]; // the sky comes last
+    if (!counts(settings, use, vertex)) return;
+    const float weight = lx_sky_weight(tracer, direction, cosine);
+    add_light(settings, out, target, use, 0, lx_rgb_scale(lx_rgb_mul(throughput, lx_sky_radiance(&tracer->sky, direction)), LX_PI * weight));
+}
+
+static void add_emission(const lx_gather_settings *settings, const lx_gather_output *out, const flight *f, const lx_ray *ray, const lx_hit *hit,
+                         const lx_shading *s)
+{
+    const int32_t source = settings->tracer->scene->surfaces[hit->surface].source;
+    if (source < 0 || lx_rgb_is_black(s->emission)) return;
+    const lx_source_use *use = &settings->uses[source];
+    if (!counts(settings, use, f->vertex)) return;
+    const lx_tracer *tracer = settings->tracer;
+    const uint32_t samples = f->vertex == 0 ? lx_direct_sample_weight(tracer, (uint32_t)source) : 1;
+    const float weight = lx_hit_weight(tracer, ray, hit, s->geometric_normal, f->cosine, samples);
+    const uint32_t cell = lx_tracer_cell_at(tracer, hit->surface, hit->triangle, hit->u, hit->v);
+    add_light(settings, out, f->target, use, cell, lx_rgb_scale(lx_rgb_mul(f->throughput, s->emission), LX_PI * weight));
+}
+
+// ---- the first loop ----------------------------------------------------------------------------------------------------------------
+
+static void send(lx_gather_batch *b, const lx_ray *ray, const lx_hit *hit, const flight *f)
+{
+    b->slow_rays[b->slow_count] = *ray;
+    b->slow_hits[b->slow_count] = *hit;
+    b->flights[b->slow_count++] = *f;
+}
+
+// Rays from the starts; those below the geometric surface are dropped. Returns how many are left; b->found is the start of each.
+static size_t make_rays(lx_gather_batch *b, const lx_gather_start *starts, size_t count)
+{
+    size_t made = 0;
+    for (size_t i = 0; i < count; ++i) {
+        const lx_gather_start *start = &starts[i];
+        const lx_vec2 u = lx_sobol_pair(start->sample, dimension_key(start->stream, 0, dimension_bounce));
+        const lx_vec3 local = lx_sample_cosine_hemisphere(u);
+        const lx_vec3 direction = lx_to_world(start->receiver->normal, local);
+        if (!(lx_dot(direction, start->receiver->geometric_normal) > 0)) continue;
+        b->rays[made] = (lx_ray){.origin = lx_offset_origin(start->receiver->position, start->receiver->geometric_normal), .direction = direction,
+                                 .t_max = INFINITY};
+        b->cosines[made] = local.z;
+        b->found[made++] = (uint32_t)i;
+    }
+    return made;
+}
+
+static void add_rows(lx_gather_batch *b, const lx_gather_settings *settings, const lx_gather_output *out, size_t count)
+{
+    const size_t stride = 3 * (size_t)settings->row_layers;
+    for (size_t i = 0; i < count; ++i) {
+        if (i + look_ahead < count) {
+            const uint16_t *next = settings->rows + stride * b->found[i + look_ahead];
+            for (size_t k = 0; k < stride; k += 32) __builtin_prefetch(next + k);
+        }
+        lx_row_add(out->sums + stride * b->found_target[i], settings->rows + stride * b->found[i], stride);
+    }
+}
+
+static void first_hits(lx_gather_batch *b, const lx_gather_settings *settings, const lx_gather_start *starts, size_t count, uint32_t first_start,
+                       const lx_gather_output *out)
+{
+    const size_t made = make_rays(b, starts, count);
+    lx_trace_closest(settings->tracer, b->rays, b->hits, made);
+    b->ray_count += made;
+    size_t pending_count = 0;
+    for (size_t i = 0; i < made; ++i) {
+        const lx_hit *hit = &b->hits[i];
+        const lx_gather_start *start = &starts[b->found[i]];
+        if (hit->surface == LX_MISS) {
+            add_sky(settings, out, (lx_rgb){1, 1, 1}, b->cosines[i], start->target, b->rays[i].direction, 0);
+            continue;
+        }
+        if (out->inverse_distance) out->inverse_distance[start->target] += 1 / hit->t;
+        const lx_lookup_surface *surface = &settings->lookup->surfaces[hit->surface];
+        if (surface->plain && hit->back && !surface->double_sided) {
+            ++out->back_hits[start->target];
+            continue;
+        }
+        if (surface->plain && settings->bounces == 0) continue;
+        const bool may_look_up = surface->plain && surface->triangles && !hit->back && hit->t >= settings->near_texels * surface->texel_m &&
+                                 surface->triangles[hit->triangle].chart != LX_NO_CHART;
+        if (may_look_up) {
+            const uint32_t random = lx_hash32(start->stream ^ (start->sample * 0x9e3779b9u));
+            const lx_taps taps = lx_lookup_taps(settings->lookup, hit, random);
+            __builtin_prefetch(&settings->lookup->places[taps.tap]);
+            b->pending[pending_count++] = (pending){taps, (uint32_t)i};
+            continue;
+        }
+        const flight f = {.throughput = {1, 1, 1}, .cosine = b->cosines[i], .stream = start->stream, .sample = start->sample,
+                          .target = start->target, .start = first_start + b->found[i], .last_surface = LX_MISS};
+        send(b, &b->rays[i], hit, &f);
+    }
+    size_t found_count = 0;
+    for (size_t k = 0; k < pending_count; ++k) {
+        const uint32_t i = b->pending[k].index;
+        const lx_gather_start *start = &starts[b->found[i]];
+        const uint32_t luxel = lx_lookup_luxel(settings->lookup, b->pending[k].taps);
+        if (luxel == LX_NO_LUXEL) {
+            const flight f = {.throughput = {1, 1, 1}, .cosine = b->cosines[i], .stream = start->stream, .sample = start->sample,
+                              .target = start->target, .start = first_start + b->found[i], .last_surface = LX_MISS};
+            send(b, &b->rays[i], &b->hits[i], &f);
+        } else if (out->luxels) {
+            out->luxels[first_start + b->found[i]] = luxel;
+        } else { // in place: found_count <= i
+            const uint32_t target = start->target;
+            b->found[found_count] = luxel;
+            b->found_target[found_count++] = target;
+        }
+    }
+    if (settings->rows && !out->luxels) add_rows(b, settings, out, found_count);
+}
+
+// ---- the second loop -----------------------------------------------------------------------------------------------------------------
+
+// Decides at a surface that lets light through: true if the ray goes straight on. The flight's throughput pays for the choice.
+static bool passes_on(flight *f, const lx_shading *s)
+{
+    const float straight = lx_rgb_max(s->transmittance);
+    if (straight == 0) return false;
+    const float probability = straight / (straight + s->opacity);
+    const uint32_t key = dimension_key(f->stream, f->vertex, dimension_pass + 8 * (f->passes + 1));
+    const bool pass = lx_sobol_one(f->sample, key) < probability;
+    f->throughput = pass ? lx_rgb_mul(f->throughput, lx_rgb_scale(s->transmittance, 1 / probability))
+                         : lx_rgb_scale(f->throughput, s->opacity / (1 - probability));
+    return pass;
+}
+
+static bool make_vertex(const flight *f, const lx_shading *s, vertex_record *out)
+{
+    lx_rgb throughput = lx_rgb_mul(f->throughput, s->albedo);
+    if (f->vertex + 1 >= roulette_from) {
+        const float survival = lx_min(1, lx_rgb_max(throughput));
+        if (!(lx_sobol_one(f->sample, dimension_key(f->stream, f->vertex, dimension_roulette)) < survival)) return false;
+        throughput = lx_rgb_scale(throughput, 1 / survival);
+    }
+    if (!(lx_rgb_max(throughput) > 0)) return false;
+    const float side = s->front ? 1.0f : -1.0f;
+    *out = (vertex_record){.receiver = {s->position, lx_scale(s->normal, side), lx_scale(s->geometric_normal, side)}, .throughput = throughput,
+                           .stream = f->stream, .sample = f->sample, .target = f->target, .start = f->start, .number = f->vertex + 1};
+    return true;
+}
+
+// The luxel that answers for a hit of the second loop; LX_NO_LUXEL: the path goes on.
+static uint32_t slow_lookup(const lx_gather_settings *settings, const flight *f, const lx_hit *hit, const lx_shading *s)
+{
+    const lx_lookup_surface *surface = &settings->lookup->surfaces[hit->surface];
+    if (!s->front || !surface->triangles || surface->triangles[hit->triangle].chart == LX_NO_CHART) return LX_NO_LUXEL;
+    if (hit->t < settings->near_texels * surface->texel_m && f->vertex < near_until) return LX_NO_LUXEL;
+    const uint32_t random = lx_hash32(dimension_key(f->stream, f->vertex, 0) ^ (f->sample * 0x9e3779b9u));
+    return lx_lookup_luxel(settings->lookup, lx_lookup_taps(settings->lookup, hit, random));
+}
+
+static lx_result add_slow_row(const lx_gather_settings *settings, const flight *f, uint32_t luxel, const lx_gather_output *out, lx_error *error)
+{
+    const size_t stride = 3 * (size_t)settings->row_layers;
+    if (out->luxels) {
+        lx_gather_extras *extras = out->extras;
+        if (!lx_array_reserve(&extras->items, &extras->capacity, extras->count + 1, sizeof *extras->items))
+            return lx_fail_memory(error, "irradiance cache");
+        extras->items[extras->count++] = (lx_gather_extra){f->target, luxel, f->throughput};
+        return LX_OK;
+    }
+    const uint16_t *rows = f->vertex == 0 ? settings->rows : settings->rows_later;
+    if (!rows) return LX_OK;
+    const float factor[3] = {f->throughput.r, f->throughput.g, f->throughput.b};
+    lx_row_add_scaled(out->sums + stride * f->target, rows + stride * luxel, settings->row_layers, factor);
+    return LX_OK;
+}
+
+// Skips what can bring little compared with what the source gives the scene on average: the light of a vertex is but one of a luxel's many rays.
+// Depends on the path and the source alone. Returns 1 / probability; 0: skipped.
+static float roulette(const vertex_record *v, uint32_t key, float brings, float scale)
+{
+    if (!(brings < scale)) return 1;
+    const float probability = brings / scale;
+    const uint32_t bits = lx_hash_combine(lx_hash_combine(v->stream, key), v->sample);
+    return lx_unit_float(bits) < probability ? 1 / probability : 0;
+}
+
+static bool sample_light(const lx_gather_settings *settings, uint32_t source, const vertex_record *v, lx_ray *ray, lx_rgb *light, uint32_t *cell)
+{
+    enum { scale_factor = 20 }; // source_scales are a twentieth of the mean
+    const lx_tracer *tracer = settings->tracer;
+    const uint32_t key = lx_hash_combine(tracer->source_keys[source], gather_key + v->number);
+    const float bound = lx_source_bound(tracer, source, &v->receiver), scale = scale_factor * tracer->source_scales[source];
+    if (bound == 0) return false;
+    const float brightness = lx_rgb_max(v->throughput);
+    const float chance = roulette(v, key ^ 0x68bc21ebu, brightness * bound, scale);
+    if (chance == 0) return false;
+    const lx_vec2 u = lx_sobol_pair(v->sample, lx_hash_combine(v->stream, key));
+    if (!lx_sample_source(tracer, source, &v->receiver, u, 1, ray, light, cell)) return false;
+    *light = lx_rgb_scale(*light, chance);
+    const float again = roulette(v, key ^ 0x02e5be93u, brightness * lx_rgb_max(*light), scale);
+    *light = lx_rgb_scale(*light, again);
+    return again > 0;
+}
+
+static void flush_shadow_rays(lx_gather_batch *b, const lx_gather_settings *settings, const lx_source_use *use, size_t count,
+                              const lx_gather_output *out)
+{
+    lx_trace_transmittance(settings->tracer, b->shadow_rays, b->transmittance, count);
+    b->ray_count += count;
+    for (size_t k = 0; k < count; ++k) {
+        const vertex_record *v = &b->vertices[b->owner[k]];
+        const lx_rgb arrives = lx_rgb_mul(b->light[k], b->transmittance[k]);
+        if (!lx_rgb_is_black(arrives)) add_light(settings, out, v->target, use, b->cell[k], lx_rgb_mul(v->throughput, arrives));
+    }
+}
+
+static void next_events(lx_gather_batch *b, const lx_gather_settings *settings, size_t vertex_count, const lx_gather_output *out)
+{
+    for (uint32_t s = 0; s < settings->tracer->source_count; ++s) {
+        const lx_source_use *use = &settings->uses[s];
+        if (use->layer < 0) continue;
+        size_t count = 0;
+        for (size_t i = 0; i < vertex_count; ++i) {
+            if (!sample_light(settings, s, &b->vertices[i], &b->shadow_rays[count], &b->light[count], &b->cell[count])) continue;
+            b->owner[count++] = (uint32_t)i;
+            if (count < batch_size) continue;
+            flush_shadow_rays(b, settings, use, count, out);
+            count = 0;
+        }
+        flush_shadow_rays(b, settings, use, count, out);
+    }
+}
+
+// One step of all slow flights: from their hits to the hits of what follows.
+static lx_result step(lx_gather_batch *b, const lx_gather_settings *settings, const lx_gather_output *out, lx_error *error)
+{
+    const size_t count = b->slow_count;
+    size_t vertex_count = 0, kept = 0;
+    lx_shade_hits(settings->tracer, b->slow_rays, b->slow_hits, b->shading, count);
+    for (size_t i = 0; i < count; ++i) {
+        flight f = b->flights[i];
+        lx_ray ray = b->slow_rays[i];
+        const lx_hit *hit = &b->slow_hits[i];
+        if (hit->surface == LX_MISS) {
+            add_sky(settings, out, f.throughput, f.cosine, f.target, ray.direction, f.vertex);
+            continue;
+        }
+        const lx_shading *s = &b->shading[i];
+        const bool again = hit->surface == f.last_surface && hit->triangle == f.last_triangle;
+        if (!again) add_emission(settings, out, &f, &ray, hit, s);
+        if (again || passes_on(&f, s)) {
+            if (++f.passes > most_passes) continue;
+            f.last_surface = hit->surface;
+            f.last_triangle = hit->triangle;
+            lx_ray_step_past(&ray, hit);
+            b->flights[kept] = f;
+            b->slow_rays[kept++] = ray;
+            continue;
+        }
+        if (!s->lit) {
+            if (f.vertex == 0) ++out->back_hits[f.target];
+            continue;
+        }
+        if (f.vertex >= settings->bounces) continue;
+        const uint32_t luxel = slow_lookup(settings, &f, hit, s);
+        if (luxel != LX_NO_LUXEL) {
+            const lx_result result = add_slow_row(settings, &f, luxel, out, error);
+            if (result != LX_OK) return result;
+            continue;
+        }
+        if (make_vertex(&f, s, &b->vertices[vertex_count])) ++vertex_count;
+    }
+    next_events(b, settings, vertex_count, out);
+    for (size_t i = 0; i < vertex_count; ++i) {
+        const vertex_record *v = &b->vertices[i];
+        const lx_vec2 u = lx_sobol_pair(v->sample, dimension_key(v->stream, v->number, dimension_bounce));
+        const lx_vec3 local = lx_sample_cosine_hemisphere(u);
+        const lx_vec3 direction = lx_to_world(v->receiver.normal, local);
+        if (!(lx_dot(direction, v->receiver.geometric_normal) > 0)) continue;
+        b->slow_rays[kept] = (lx_ray){.origin = lx_offset_origin(v->receiver.position, v->receiver.geometric_normal), .direction = direction,
+                                      .t_max = INFINITY};
+        b->flights[kept++] = (flight){.throughput = v->throughput, .cosine = local.z, .stream = v->stream, .sample = v->sample, .target = v->target,
+                                      .start = v->start, .vertex = v->number, .last_surface = LX_MISS};
+    }
+    lx_trace_closest(settings->tracer, b->slow_rays, b->slow_hits, kept);
+    b->ray_count += kept;
+    b->slow_count = kept;
+    return LX_OK;
+}
+
+lx_result lx_gather_trace(lx_gather_batch *b, const lx_gather_settings *settings, const lx_gather_start *starts, size_t count,
+                          const lx_gather_output *out, lx_error *error)
+{
+    lx_result result = LX_OK;
+    b->slow_count = 0;
+    if (out->luxels)
+        for (size_t i = 0; i < count; ++i) out->luxels[i] = LX_NO_LUXEL;
+    for (size_t first = 0; first < count && result == LX_OK; first += batch_size) {
+        const size_t n = count - first < batch_size ? count - first : (size_t)batch_size;
+        first_hits(b, settings, starts + first, n, (uint32_t)first, out);
+        while (b->slow_count >= batch_size && result == LX_OK) result = step(b, settings, out, error); // each step leaves at most as many
+    }
+    while (b->slow_count > 0 && result == LX_OK) result = step(b, settings, out, error);
+    return result;
+}

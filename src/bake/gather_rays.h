@@ -1,0 +1,66 @@
+/// Gather rays: from a luxel's sites to where the light is already known.
+///
+/// A cosine-weighted ray leaves a site; what it hits is looked up in the rows of the luxel there, for all layers at once. Hits nearer than a texel or two
+/// (where a texel's mean says little), and on what has no valid luxel, go on as a path with next-event estimation until one can be looked up. Light
+/// sources met by the first ray carry their multiple importance weight against the samples of trace/direct.h; nothing is counted twice.
+///
+/// Based on: [Jensen1996] final gathering over a cache of irradiance; [Ward1988]; here the cache is the lightmap itself.
+#ifndef LX_BAKE_GATHER_RAYS_H
+#define LX_BAKE_GATHER_RAYS_H
+
+#include "bake/lookup.h"
+#include "bake/rows.h"
+
+typedef struct lx_gather_settings {
+    const lx_tracer *tracer;
+    const lx_lookup *lookup;
+    const lx_source_use *uses;  ///< One per source of the tracer.
+    const float *scales;        ///< [row_layers] rows and sums hold light × scale × 1 / LX_ROW_UNIT.
+    uint32_t row_layers;        ///< lx_row_layers(layer count)
+    uint32_t bounces;           ///< 0: only light sources are met.
+    bool direct;                ///< Light sources met by the first ray count (those of mixed lights never, unless `everything`).
+    bool everything;            ///< The cache's own rays: all light counts.
+    const uint16_t *rows;       ///< [luxel][3][row_layers] what a first hit reads: all bounces but one. NULL: nothing (or recorded, see below).
+    const uint16_t *rows_later; ///< What later hits read: all bounces but two.
+    float near_texels;          ///< Hits nearer than so many texels of their surface are not looked up.
+} lx_gather_settings;
+
+typedef struct lx_gather_start {
+    const lx_receiver *receiver;
+    uint32_t stream; ///< Key of the luxel's random numbers.
+    uint32_t sample; ///< Number of the ray within the stream.
+    uint32_t target; ///< Row of the sums.
+} lx_gather_start;
+
+/// Where a later hit of a recorded ray found its light.
+typedef struct lx_gather_extra {
+    uint32_t target, luxel;
+    lx_rgb weight;
+} lx_gather_extra;
+
+typedef struct lx_gather_extras {
+    lx_gather_extra *items;
+    size_t count, capacity;
+} lx_gather_extras;
+
+typedef struct lx_gather_output {
+    float *sums;             ///< [target][3][row_layers], added to.
+    uint32_t *back_hits;     ///< [target] first rays that met the black side of a surface, added to.
+    float *inverse_distance; ///< [target] sum of 1 / distance of first hits, added to; NULL: not asked for.
+    uint32_t *luxels;        ///< Recording (no rows are read): [start] luxel that the first hit may be looked up at, else LX_NO_LUXEL. NULL: rows are added.
+    lx_gather_extras *extras; ///< Recording: later hits.
+} lx_gather_output;
+
+enum { lx_gather_batch_size = 2048 };
+
+/// Working memory of one worker.
+typedef struct lx_gather_batch lx_gather_batch;
+lx_gather_batch *lx_gather_batch_create(void);
+void lx_gather_batch_destroy(lx_gather_batch *batch);
+uint64_t lx_gather_batch_rays(const lx_gather_batch *batch);
+
+/// Traces one ray from each start, and what follows. The order of additions depends on the arguments alone.
+lx_result lx_gather_trace(lx_gather_batch *batch, const lx_gather_settings *settings, const lx_gather_start *starts, size_t count,
+                          const lx_gather_output *output, lx_error *error);
+
+#endif
