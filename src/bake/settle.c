@@ -238,13 +238,14 @@ static uint32_t room_of(const company *c, uint32_t members)
     return room;
 }
 
-// The room that most good sites lie in: those that were not moved count first.
-static uint32_t largest_room(const company *c)
+// The room that most good sites lie in; of those that were not moved, if there are enough to tell.
+static uint32_t largest_room(const company *c, uint32_t *out_count)
 {
+    const bool fallen_alone = bit_count(c->good & ~c->moved) >= enough_sites;
     uint32_t best = 0, best_votes = 0;
-    for (uint32_t rest = c->good; rest;) {
-        const uint32_t room = room_of(c, rest);
-        const uint32_t votes = bit_count(room & ~c->moved) * (lx_site_count + 1) + bit_count(room);
+    *out_count = 0;
+    for (uint32_t rest = fallen_alone ? c->good & ~c->moved : c->good; rest; ++*out_count) {
+        const uint32_t room = room_of(c, rest), votes = bit_count(room);
         if (votes > best_votes) {
             best = room;
             best_votes = votes;
@@ -272,17 +273,11 @@ static bool is_crowded(lx_texel *t)
     return lx_trace_crowded(t->bake->tracer, patches, t->fragment_count);
 }
 
-// What the sites of a crowded or covered texel come to: those that its light is taken from. 0: none.
-static uint32_t choose_sites(company *c)
+// Moves sites until there are enough good ones.
+static void move_sites(company *c, uint32_t enough)
 {
-    if (all_look_free(c)) {
-        c->good = (1u << lx_site_count) - 1;
-        return largest_room(c);
-    }
-    for (uint32_t k = 0; k < lx_site_count; ++k)
-        if (is_good(c, &c->sites[k], k)) c->good |= 1u << k;
     uint32_t failures = 0;
-    for (uint32_t k = 0; k < lx_site_count && failures < most_failures && bit_count(c->good) < enough_sites; ++k) {
+    for (uint32_t k = 0; k < lx_site_count && failures < most_failures && bit_count(c->good) < enough; ++k) {
         if (c->good >> k & 1) continue;
         if (!move_out(c, k, &c->sites[k])) {
             ++failures;
@@ -291,8 +286,25 @@ static uint32_t choose_sites(company *c)
         c->good |= 1u << k;
         c->moved |= 1u << k;
     }
-    const uint32_t room = largest_room(c), fallen = room & ~c->moved;
-    return bit_count(fallen) >= enough_sites ? fallen : room;
+}
+
+// What the sites of a crowded or covered texel come to: those that its light is taken from. 0: none.
+static uint32_t choose_sites(company *c)
+{
+    uint32_t rooms;
+    if (all_look_free(c)) {
+        c->good = (1u << lx_site_count) - 1;
+        return largest_room(c, &rooms);
+    }
+    for (uint32_t k = 0; k < lx_site_count; ++k)
+        if (is_good(c, &c->sites[k], k)) c->good |= 1u << k;
+    move_sites(c, enough_sites);
+    uint32_t room = largest_room(c, &rooms);
+    if (rooms > 1 && c->moved) { // too close a vote for so few: neighbours along a wall must come to the same side of it
+        move_sites(c, lx_site_count);
+        room = largest_room(c, &rooms);
+    }
+    return room;
 }
 
 // Every site becomes one of the chosen ones, in turn.

@@ -7,6 +7,8 @@
 #include "math/sobol.h"
 #include "trace/sampling.h"
 
+#include <string.h>
+
 uint32_t lx_luxel_stream(const lx_bake *bake, const lx_luxel_page *page, uint32_t texel)
 {
     return lx_stream_key(bake->desc.transport.seed, page->number, texel);
@@ -26,6 +28,11 @@ void lx_texel_open(lx_texel *t, const lx_bake *bake, const lx_luxel_page *page, 
     for (uint32_t i = 0; i < lx_piece_slots; ++i) t->pieces[i].fragment = UINT32_MAX;
 }
 
+static bool are_equal(const lx_vec3 v[3])
+{
+    return memcmp(&v[0], &v[1], sizeof v[0]) == 0 && memcmp(&v[0], &v[2], sizeof v[0]) == 0;
+}
+
 const lx_piece *lx_texel_piece(lx_texel *t, uint32_t fragment)
 {
     lx_piece *piece = &t->pieces[fragment % lx_piece_slots];
@@ -41,6 +48,11 @@ const lx_piece *lx_texel_piece(lx_texel *t, uint32_t fragment)
     lx_vec3 at;
     lx_hit_geometry(tracer, &(lx_hit){.surface = f->surface, .triangle = f->triangle}, &at, &piece->normal);
     piece->smooth = lx_triangle_normals(tracer, f->surface, f->triangle, piece->vertex_normal);
+    piece->shading_normal = piece->normal;
+    if (piece->smooth && are_equal(piece->vertex_normal)) { // as exporters write faces with hard edges
+        piece->smooth = false;
+        piece->shading_normal = lx_normal_at(tracer, f->surface, f->triangle, 0, 0);
+    }
     const lx_vec3 cross = lx_cross(lx_sub(piece->world[1], piece->world[0]), lx_sub(piece->world[2], piece->world[0]));
     piece->texel_m = (float)sqrt((double)lx_length(cross) / fabs(piece->whole));
     return piece;
@@ -146,7 +158,8 @@ const lx_piece *lx_texel_site(lx_texel *t, uint32_t number, lx_receiver *out)
     const lx_piece *piece = choose(t, u, &b);
     const lx_fragment *f = &t->fragments[piece->fragment];
     out->position = blend(piece, b);
-    out->geometric_normal = out->normal = piece->normal;
+    out->geometric_normal = piece->normal;
+    out->normal = piece->shading_normal;
     if (piece->smooth) {
         out->normal = lx_normal_at(t->bake->tracer, f->surface, f->triangle, b.x, b.y);
         out->position = lift(t->bake->tracer, piece, b, out->position);

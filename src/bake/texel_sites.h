@@ -13,7 +13,8 @@ typedef struct lx_piece {
     lx_polygon part;    ///< Within the texel.
     lx_vec3 world[3], vertex_normal[3];
     lx_vec3 normal;     ///< Geometric.
-    bool smooth;
+    bool smooth;        ///< False: its vertex normals are all `normal`, or equal each other: `shading_normal`.
+    lx_vec3 shading_normal;
     float texel_m;      ///< Edge of a texel on this triangle, metres.
 } lx_piece;
 
