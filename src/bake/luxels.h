@@ -24,6 +24,9 @@ typedef struct lx_settled {
     uint8_t number[lx_site_count];
 } lx_settled;
 
+/// First number of each instance's charts in lx_bake.texel_chart: [instance_count], owned by the caller; NULL: no memory.
+uint32_t *lx_chart_bases(const lx_atlas *atlas);
+
 /// All fragments of a page, grouped by texel: those of texel i are first[i] … first[i + 1] - 1. All of a texel's fragments belong to one chart.
 typedef struct lx_luxel_page {
     uint32_t number;
