@@ -11,6 +11,7 @@
 // `salt` gives a bake other random numbers at the same places: sites of luxels are drawn from the seed alone, so bakes of one seed and different salts differ by
 // the integrator's noise and by nothing else. The linker's --wrap does that; nothing in the product knows of it.
 #include "bake/bake.h"
+#include "bake/finished.h"
 #include "bake/luxels.h"
 #include "base/clock.h"
 #include "base/error.h"
@@ -150,14 +151,17 @@ static void parse_entry(entry *e, char *text, const lx_bake_desc *base)
 static void add_layers(const bench *b, const lx_bake *bake, float *sum)
 {
     const size_t page_texels = b->texel_count / b->atlas->page_count;
+    float *image = lx_malloc_array(page_texels, 3 * sizeof *image);
+    if (!image) abort();
     for (uint32_t page = 0; page < b->atlas->page_count; ++page)
         for (uint32_t layer = 0; layer < bake->layer_count; ++layer) {
             const lx_layer *l = &bake->layers[layer];
-            const float *image = lx_bake_image(bake, page, layer);
+            if (lx_finished_image(bake->finished, page, layer, image, NULL) != LX_OK) abort();
             float *out = sum + 3 * page * page_texels;
             for (size_t i = 0; i < page_texels; ++i)
                 for (size_t c = 0; c < 3; ++c) out[3 * i + c] += l->color[c] * l->intensity * image[3 * i + c];
         }
+    lx_free(image);
 }
 
 // Covered, valid, and so are its eight neighbours, all of the same chart.

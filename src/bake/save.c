@@ -55,6 +55,12 @@ static const char *kind_name(const lx_bake *bake, lx_source_kind kind)
     return bake->desc.combined ? "combined" : names[kind];
 }
 
+static const char *denoiser_name(const lx_bake *bake)
+{
+    static const char *const names[] = {[LX_DENOISE_NONE] = "none", [LX_DENOISE_BUILTIN] = "builtin", [LX_DENOISE_OIDN] = "oidn"};
+    return bake->desc.integrator == LX_INTEGRATOR_PATH ? "none" : names[bake->desc.denoise]; // paths are never denoised
+}
+
 // Every monitor, also those that share their layers with others.
 static void list_monitors(const lx_bake *bake, lx_manifest *manifest)
 {
@@ -113,7 +119,9 @@ static lx_result describe(const lx_bake *bake, lx_manifest *manifest, lx_error *
         .bake = {
             .samples = bake->desc.samples,
             .bounces = bake->desc.direct_only ? 0 : bake->desc.transport.bounces,
-            .integrator = "path",
+            .integrator = bake->desc.integrator == LX_INTEGRATOR_PATH ? "path" : "gather",
+            .denoise = denoiser_name(bake),
+            .noise = bake->summary.noise,
             .seed = bake->desc.transport.seed,
             .isa = bake->tracer ? lx_tracer_isa(bake->tracer) : "",
             .seconds = bake->summary.seconds,
