@@ -47,6 +47,7 @@ typedef struct lx_bake_desc {
     double time_s;        ///< Gather: samples are added in rounds until this much time has passed; `samples` and `noise` count too. The result depends on
                           ///< the machine. 0 (default): no limit.
     uint64_t memory_bytes; ///< Gather: layers are baked in groups so that the process stays below it. 0 (default): no limit.
+    const char *scratch_folder; ///< Where finished layers wait on disk if there is a memory limit. NULL (default): as TMPDIR says, else /var/tmp.
     lx_denoiser denoise;  ///< Gather only. Default LX_DENOISE_BUILTIN.
     bool combined;        ///< One layer with all sources at their authored colours. Default false.
     uint32_t max_layers;  ///< More sources are grouped by material, then by parent node. Default 64.
@@ -108,6 +109,7 @@ typedef struct lx_budget {
 /// Where the time went, in seconds.
 typedef struct lx_stage_seconds {
     double import, unwrap, luxels, bake, post, save, preview;
+    double direct, cache, gather, denoise; ///< Parts of `bake`; 0 where an integrator has no such stage.
 } lx_stage_seconds;
 
 typedef struct lx_bake_summary {

@@ -52,8 +52,9 @@ static const char style[] =
     "tfoot td,tfoot th{font-weight:600;border-bottom:0}"
     ".bar{display:flex;height:14px;border-radius:7px;overflow:hidden;background:var(--line);margin:0 0 10px;print-color-adjust:exact;"
     "-webkit-print-color-adjust:exact}.bar i{display:block;min-width:1px}"
-    ".s0{background:#8a5a2b}.s1{background:#c98a3c}.s2{background:#e0b65c}.s3{background:#c8553d}.s4{background:#7a4e7e}"
-    ".s5{background:#3f6c8f}.s6{background:#5d9a78}"
+    ".s0{background:#8a5a2b}.s1{background:#c98a3c}.s2{background:#e0b65c}.s3{background:#e39a7b}.s4{background:#a8644f}"
+    ".s5{background:#c8553d}.s6{background:#8f7fb0}.s7{background:#c8553d}.s8{background:#7a4e7e}.s9{background:#3f6c8f}"
+    ".s10{background:#5d9a78}"
     "th .swatch{display:inline-block;margin-right:.6em}"
     "footer{margin-top:3em;color:var(--soft);font-size:.85rem}"
     "@media print{body{background:#fff;font-size:11pt}main{max-width:none;padding:0}.layers{grid-template-columns:repeat(4,1fr)}"
@@ -163,6 +164,12 @@ static void add_key_figures(const lx_report *report, lx_builder *html)
     lx_builder_add(html, "<div><b>");
     add_seconds(html, s->seconds);
     add_figure(html, "of baking");
+    if (s->noise > 0) {
+        lx_builder_add(html, "<div><b>");
+        add_quantity(html, 100 * (double)s->noise);
+        lx_builder_add(html, "&nbsp;%");
+        add_figure(html, strcmp(report->manifest->bake.denoise, "none") == 0 ? "noise, estimated" : "noise, estimated before denoising");
+    }
     lx_builder_add(html, "</div>\n");
 }
 
@@ -444,13 +451,21 @@ static lx_result add_disk(const lx_report *report, lx_builder *html, lx_error *e
 static void add_stages(const lx_report *report, lx_builder *html)
 {
     const lx_stage_seconds *s = &report->manifest->bake.stages;
+    const double parts = s->direct + s->cache + s->gather + s->denoise; // of the bake
     const struct {
         const char *name, *what;
         double seconds;
     } stages[] = {
-        {"import", "reading and checking the scene", s->import}, {"unwrap", "charts and atlas", s->unwrap},
-        {"luxels", "texels in the world", s->luxels},            {"bake", "tracing", s->bake},
-        {"post", "filling the padding", s->post},                {"save", "mips, pack, files", s->save},
+        {"import", "reading and checking the scene", s->import},
+        {"unwrap", "charts and atlas", s->unwrap},
+        {"luxels", "texels in the world", s->luxels},
+        {"direct", "light straight from its sources", s->direct},
+        {"cache", "light that bounces between texels", s->cache},
+        {"gather", "what every texel sees of both", s->gather},
+        {"denoise", "smoothing what noise is left", s->denoise},
+        {"bake", parts > 0 ? "the rest of it" : "tracing", s->bake - parts},
+        {"post", "filling the padding", s->post},
+        {"save", "mips, pack, files", s->save},
         {"preview", "the picture above", s->preview},
     };
     enum { stage_count = sizeof stages / sizeof *stages };
@@ -486,9 +501,33 @@ static void add_settings(const lx_report *report, lx_builder *html)
     static const char end[] = "</td></tr>\n";
     const lx_manifest_bake *b = &report->manifest->bake;
     const lx_bake_desc *desc = &report->bake->desc;
+    const bool gather = desc->integrator == LX_INTEGRATOR_GATHER;
     lx_builder_add(html, "<section><h2>Settings</h2><table>\n");
-    add_setting(html, "samples per texel");
+    add_setting(html, "integrator");
+    lx_html_text(html, b->integrator);
+    lx_builder_add(html, end);
+    add_setting(html, gather ? "samples per texel, at most" : "samples per texel");
     lx_builder_format(html, "%u%s", b->samples, end);
+    if (gather && desc->noise > 0) {
+        add_setting(html, "noise wanted");
+        add_quantity(html, 100 * (double)desc->noise);
+        lx_builder_format(html, "&nbsp;%%%s", end);
+    }
+    if (gather && desc->time_s > 0) {
+        add_setting(html, "time limit");
+        add_seconds(html, desc->time_s);
+        lx_builder_add(html, end);
+    }
+    if (gather && desc->memory_bytes > 0) {
+        add_setting(html, "memory limit");
+        add_bytes(html, desc->memory_bytes);
+        lx_builder_add(html, end);
+    }
+    if (gather) {
+        add_setting(html, "denoiser");
+        lx_html_text(html, b->denoise);
+        lx_builder_add(html, end);
+    }
     add_setting(html, "bounces");
     if (b->bounces == LX_BOUNCES_INF)
         lx_builder_add(html, "∞");
@@ -498,9 +537,6 @@ static void add_settings(const lx_report *report, lx_builder *html)
     add_setting(html, "light");
     lx_builder_format(html, "%s%s%s", desc->direct_only ? "direct only" : desc->indirect_only ? "bounced only" : "direct and bounced",
                       desc->transport.coloured_shadows ? ", coloured shadows" : "", end);
-    add_setting(html, "integrator");
-    lx_html_text(html, b->integrator);
-    lx_builder_add(html, end);
     add_setting(html, "seed");
     lx_builder_format(html, "%u%s", b->seed, end);
     if (report->manifest->has_sky) {

@@ -71,21 +71,15 @@ void lx_advise_on_scene(const lx_bake *bake)
     advise_on_domes(bake);
 }
 
-static bool is_black(const lx_bake *bake, uint32_t layer)
+lx_result lx_advise_on_layers(const lx_bake *bake, lx_error *error)
 {
-    const size_t value_count = 3 * (size_t)bake->atlas->page_size * bake->atlas->page_size;
-    for (uint32_t page = 0; page < bake->atlas->page_count; ++page) {
-        const float *image = lx_bake_image(bake, page, layer);
-        for (size_t i = 0; i < value_count; ++i)
-            if (image[i] > 0) return false;
+    for (uint32_t i = 0; i < bake->layer_count; ++i) {
+        lx_layer_range range;
+        const lx_result result = lx_finished_range(bake->finished, i, &range, error);
+        if (result != LX_OK) return result;
+        if (range.largest > 0) continue;
+        lx_log_warning(log_of(bake), "layer '%s' (%s) lights nothing: is it enclosed, facing away or outside the scene?", bake->layers[i].name,
+                       bake->layers[i].node[0] ? bake->layers[i].node : "sky");
     }
-    return true;
-}
-
-void lx_advise_on_layers(const lx_bake *bake)
-{
-    for (uint32_t i = 0; i < bake->layer_count; ++i)
-        if (is_black(bake, i))
-            lx_log_warning(log_of(bake), "layer '%s' (%s) lights nothing: is it enclosed, facing away or outside the scene?",
-                           bake->layers[i].name, bake->layers[i].node[0] ? bake->layers[i].node : "sky");
+    return LX_OK;
 }

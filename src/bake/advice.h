@@ -7,6 +7,6 @@
 /// Before tracing: surfaces inside a lamp's sphere, an unlit dome that hides the sky.
 void lx_advise_on_scene(const lx_bake *bake);
 /// After it: layers that light nothing.
-void lx_advise_on_layers(const lx_bake *bake);
+lx_result lx_advise_on_layers(const lx_bake *bake, lx_error *error);
 
 #endif

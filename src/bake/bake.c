@@ -8,7 +8,6 @@
 #include "bake/layers.h"
 #include "base/clock.h"
 #include "base/error.h"
-#include "post/dilate.h"
 
 #include <string.h>
 
@@ -24,6 +23,14 @@ lx_bake_desc lx_bake_desc_default(void)
     lx_bake_desc desc = {.transport = lx_transport_desc_default(), .integrator = LX_INTEGRATOR_PATH, .samples = 256, .noise = 0.02f, .denoise = LX_DENOISE_BUILTIN,
                          .max_layers = 64};
     return desc;
+}
+
+// Room for all layers of the luxels that `map` knows.
+static lx_result create_finished(lx_bake *bake, const lx_luxel_map *map, lx_error *error)
+{
+    lx_finished_destroy(bake->finished);
+    bake->finished = NULL;
+    return lx_finished_create(map, bake->layer_count, false, NULL, &bake->finished, error);
 }
 
 static lx_result check_desc(const lx_bake_desc *desc, lx_error *error)
@@ -68,21 +75,20 @@ lx_result lx_bake_create(const lx_scene *scene, const lx_atlas *atlas, const lx_
     LX_TRY(create_tracer(bake, error));
     LX_TRY(lx_layers_build(bake, error));
     LX_TRY(lx_animations_build(bake, error));
-    size_t texel_count, value_count;
-    if (!lx_mul_size((size_t)atlas->page_size * atlas->page_size, atlas->page_count, &texel_count) ||
-        !lx_mul_size(texel_count * 3, bake->layer_count, &value_count)) {
-        result = lx_fail(error, LX_ERROR_LIMIT, "%u pages of %u layers are too many", atlas->page_count, bake->layer_count);
+    size_t texel_count;
+    if (!lx_mul_size((size_t)atlas->page_size * atlas->page_size, atlas->page_count, &texel_count)) {
+        result = lx_fail(error, LX_ERROR_LIMIT, "%u pages are too many", atlas->page_count);
         goto cleanup;
     }
-    bake->texels = lx_calloc_array(value_count, sizeof *bake->texels);
     bake->texel_chart = lx_malloc_array(texel_count, sizeof *bake->texel_chart);
     bake->texel_coverage = lx_calloc_array(texel_count, sizeof *bake->texel_coverage);
-    if (!bake->texels || !bake->texel_chart || !bake->texel_coverage) {
-        result = lx_fail(error, LX_ERROR_OUT_OF_MEMORY, "out of memory: %u layers of %u pages need %.1f GiB; fewer layers or pages do",
-                         bake->layer_count, atlas->page_count, (double)value_count * sizeof(float) / (1u << 30));
+    if (!bake->texel_chart || !bake->texel_coverage) {
+        result = lx_fail_memory(error, "texels");
         goto cleanup;
     }
     memset(bake->texel_chart, 0xff, texel_count * sizeof *bake->texel_chart); // LX_NO_CHART
+    const lx_luxel_map none = {.page_size = atlas->page_size, .page_count = atlas->page_count};
+    LX_TRY(create_finished(bake, &none, error)); // a bake that never ran is black
     *out_bake = bake;
     bake = NULL;
 cleanup:
@@ -96,7 +102,7 @@ void lx_bake_destroy(lx_bake *bake)
     lx_animations_release(bake);
     lx_layers_release(bake);
     lx_tracer_destroy(bake->tracer);
-    lx_free(bake->texels);
+    lx_finished_destroy(bake->finished);
     lx_free(bake->texel_chart);
     lx_free(bake->texel_coverage);
     lx_free(bake);
@@ -153,6 +159,7 @@ static lx_result place_luxels(lx_bake_job *job, lx_error *error)
     lx_pool *pool = bake->scene->context->pool;
     LX_TRY(lx_pool_run(pool, atlas->page_count, rasterise_page, job, "luxels", job->progress, error));
     LX_TRY(lx_bake_map_build(atlas->page_size, atlas->page_count, bake->texel_chart, bake->texel_coverage, &job->map, error));
+    LX_TRY(create_finished(job->bake, &job->map.view, error));
     job->tile_weights = lx_malloc_array(job->map.tile_count, sizeof *job->tile_weights);
     if (!job->tile_weights) return lx_fail_memory(error, "tiles");
     for (uint32_t i = 0; i < job->map.tile_count; ++i) job->tile_weights[i] = (float)job->map.tiles[i].count;
@@ -161,30 +168,14 @@ cleanup:
     return result;
 }
 
-// Fills padding and invalid texels of one page in all layers.
+// Where padding and invalid texels of one page take their light from.
 static lx_result fill_page(void *user, size_t page, uint32_t worker, lx_error *error)
 {
     (void)worker;
-    lx_bake_job *job = user;
-    lx_bake *bake = job->bake;
-    const uint32_t size = bake->atlas->page_size;
-    const size_t texel_count = (size_t)size * size;
-    uint32_t *source = lx_malloc_array(texel_count, sizeof *source);
-    uint8_t *valid = lx_malloc_array(texel_count, 1);
-    lx_result result = LX_OK;
-    if (!source || !valid) {
-        result = lx_fail_memory(error, "dilation");
-        goto cleanup;
-    }
-    const uint8_t *coverage = bake->texel_coverage + page * texel_count;
-    for (size_t i = 0; i < texel_count; ++i) valid[i] = coverage[i] && lx_luxel_is_valid(&job->pages[page], (uint32_t)i);
-    LX_TRY(lx_dilate_map(size, bake->atlas->padding, bake->texel_chart + page * texel_count, valid, source, error));
-    for (uint32_t layer = 0; layer < bake->layer_count; ++layer)
-        lx_dilate_apply(size, source, lx_bake_image(bake, (uint32_t)page, layer));
-cleanup:
-    lx_free(source);
-    lx_free(valid);
-    return result;
+    const lx_bake_job *job = user;
+    const lx_bake *bake = job->bake;
+    const size_t texel_count = (size_t)bake->atlas->page_size * bake->atlas->page_size;
+    return lx_finished_dilate(bake->finished, &job->map.view, (uint32_t)page, bake->atlas->padding, bake->texel_chart + page * texel_count, error);
 }
 
 // Seconds since *start, which becomes now.
@@ -268,7 +259,7 @@ lx_result lx_bake_run(lx_bake *bake, const lx_progress_sink *progress, lx_error 
     job.stages.post = lap(&stage_start);
     summarise(&job, start);
     LX_TRY(check_sum_of_layers(&job, error));
-    lx_advise_on_layers(bake);
+    LX_TRY(lx_advise_on_layers(bake, error));
 cleanup:
     release_job(&job);
     return result;

@@ -2,6 +2,7 @@
 #ifndef LX_BAKE_BAKE_H
 #define LX_BAKE_BAKE_H
 
+#include "bake/finished.h"
 #include "luxel/bake.h"
 #include "scene/atlas.h"
 #include "trace/path.h"
@@ -34,21 +35,13 @@ struct lx_bake {
 
     struct lx_bake_animations *animations; ///< What drives the layers (bake/animations.h); NULL: nothing.
 
-    /// T of every layer: image (page * layer_count + layer), page_size² × RGB floats, row 0 first. Unit light: lux per cd, lx or nt
-    /// (for `combined`: lux). After lx_bake_run padding is filled by dilation.
-    float *texels;
     /// Chart that owns a texel, [page_count][page_size²], numbered over the whole atlas; LX_NO_CHART: empty. With dilation's claims.
     uint32_t *texel_chart;
     /// Share of a texel's square that surfaces cover, 0…255, [page_count][page_size²]; 0: none (padding or empty).
     uint8_t *texel_coverage;
+    lx_finished *finished; ///< T of every layer, black until lx_bake_run. Unit light: lux per cd, lx or nt (for `combined`: lux).
 
     lx_bake_summary summary;
 };
-
-static inline float *lx_bake_image(const lx_bake *bake, uint32_t page, uint32_t layer)
-{
-    const size_t texel_count = (size_t)bake->atlas->page_size * bake->atlas->page_size;
-    return bake->texels + 3 * texel_count * ((size_t)page * bake->layer_count + layer);
-}
 
 #endif

@@ -17,6 +17,7 @@
 #include "trace/direct.h"
 #include "trace/tracer_data.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 enum {
@@ -29,7 +30,7 @@ enum {
     most_passes = 1000,
 };
 
-static const float near_texels = 1.0f;
+static const float near_texels = 2.0f;
 static const double enough_energy = 1e-3; // of a layer's: what later bounces may still have added
 static const float darkest = 0.01f;      // of a layer's mean: below it errors count as if the texel were that bright
 static const uint32_t cache_stream = 0x63616368;
@@ -591,19 +592,18 @@ static lx_result allocate(gather_job *g, lx_error *error)
     return LX_OK;
 }
 
-static void store_layers(const gather_job *g)
+static lx_result store_layers(const gather_job *g, lx_error *error)
 {
-    const lx_luxel_map *map = &g->job->map.view;
-    const size_t page_texels = (size_t)map->page_size * map->page_size;
+    lx_rgb layer[tile_luxels];
     for (uint32_t l = 0; l < g->layer_count; ++l)
-        for (uint32_t i = 0; i < map->count; ++i) {
-            const size_t at = (size_t)l * g->luxel_count + i;
-            const lx_rgb e = lx_rgb_add(g->direct[at].mean, g->indirect[at].mean);
-            float *out = lx_bake_image(g->bake, (uint32_t)(map->texel[i] / page_texels), g->first_layer + l) + 3 * (map->texel[i] % page_texels);
-            out[0] = e.r;
-            out[1] = e.g;
-            out[2] = e.b;
+        for (uint32_t first = 0; first < g->luxel_count; first += tile_luxels) {
+            const uint32_t count = g->luxel_count - first < tile_luxels ? g->luxel_count - first : tile_luxels;
+            const size_t at = (size_t)l * g->luxel_count + first;
+            for (uint32_t i = 0; i < count; ++i) layer[i] = lx_rgb_add(g->direct[at + i].mean, g->indirect[at + i].mean);
+            const lx_result result = lx_finished_write(g->bake->finished, g->first_layer + l, first, count, layer, error);
+            if (result != LX_OK) return result;
         }
+    return LX_OK;
 }
 
 // Relative standard error of the sum at authored colours. Layers share their rays, so their errors go together: the first round told how much.
@@ -667,7 +667,7 @@ lx_result lx_bake_by_gathering(lx_bake_job *job, lx_error *error)
     LX_TRY(run_rounds(&g, start, error));
     job->noise = estimate_noise(&g);
     job->group_count = 1;
-    store_layers(&g);
+    LX_TRY(store_layers(&g, error));
 cleanup:
     release(&g, workers);
     return result;

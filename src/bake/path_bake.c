@@ -13,6 +13,7 @@ typedef struct tile_scratch {
     double *sums;         // [luxel of the tile][layer][channel]
     lx_receiver sites[lx_site_count];
     lx_path_start starts[lx_path_batch_size];
+    lx_rgb layer[tile_luxels]; // one layer on its way out
 } tile_scratch;
 
 typedef struct path_job {
@@ -47,31 +48,29 @@ static void trace_luxels(const path_job *p, const lx_luxel_tile *tile, tile_scra
     lx_path_trace(s->batch, &p->settings, s->starts, filled, s->sums, NULL);
 }
 
-static void store_luxels(const path_job *p, const lx_luxel_tile *tile, const tile_scratch *s)
+static lx_result store_luxels(const path_job *p, const lx_luxel_tile *tile, tile_scratch *s, lx_error *error)
 {
     const lx_bake *bake = p->job->bake;
-    const size_t page_texels = (size_t)bake->atlas->page_size * bake->atlas->page_size;
     const double scale = 1.0 / bake->desc.samples;
     for (uint32_t layer = 0; layer < bake->layer_count; ++layer) {
-        float *image = lx_bake_image(bake, tile->page, layer);
         for (uint32_t i = 0; i < tile->count; ++i) {
             const double *sum = s->sums + 3 * ((size_t)i * bake->layer_count + layer);
-            float *out = image + 3 * (p->job->map.texel[tile->first + i] - tile->page * page_texels);
-            for (int c = 0; c < 3; ++c) out[c] = (float)(sum[c] * scale);
+            s->layer[i] = (lx_rgb){(float)(sum[0] * scale), (float)(sum[1] * scale), (float)(sum[2] * scale)};
         }
+        const lx_result result = lx_finished_write(bake->finished, layer, tile->first, tile->count, s->layer, error);
+        if (result != LX_OK) return result;
     }
+    return LX_OK;
 }
 
 static lx_result bake_tile(void *user, size_t task, uint32_t worker, lx_error *error)
 {
-    (void)error;
     const path_job *p = user;
     const lx_luxel_tile *tile = &p->job->map.tiles[task];
     tile_scratch *s = &p->scratch[worker];
     memset(s->sums, 0, sizeof(double) * 3 * tile->count * p->job->bake->layer_count);
     trace_luxels(p, tile, s);
-    store_luxels(p, tile, s);
-    return LX_OK;
+    return store_luxels(p, tile, s, error);
 }
 
 lx_result lx_bake_by_paths(lx_bake_job *job, lx_error *error)

@@ -31,30 +31,6 @@ static lx_result advance(save_progress *progress, lx_error *error)
 
 // ---- what a layer's light looks like as numbers
 
-typedef struct layer_range {
-    float largest; // channel of any texel
-    double mean;   // over channels of covered texels
-} layer_range;
-
-static layer_range measure_layer(const lx_bake *bake, uint32_t layer)
-{
-    const size_t texel_count = (size_t)bake->atlas->page_size * bake->atlas->page_size;
-    layer_range range = {0};
-    double sum = 0, count = 0;
-    for (uint32_t page = 0; page < bake->atlas->page_count; ++page) {
-        const float *rgb = lx_bake_image(bake, page, layer);
-        const uint8_t *coverage = bake->texel_coverage + page * texel_count;
-        for (size_t i = 0; i < texel_count; ++i) {
-            for (int k = 0; k < 3; ++k) range.largest = fmaxf(range.largest, rgb[3 * i + k]);
-            if (!coverage[i]) continue;
-            sum += (double)rgb[3 * i] + (double)rgb[3 * i + 1] + (double)rgb[3 * i + 2];
-            count += 3;
-        }
-    }
-    range.mean = count > 0 ? sum / count : 0;
-    return range;
-}
-
 // KTX2 holds physical values wherever they fit what half floats and RGB9E5 do well: full precision from 2^-14 (2^-16) to 2^16.
 static float ktx2_scale(float largest)
 {
@@ -77,6 +53,12 @@ static const char *kind_name(const lx_bake *bake, lx_source_kind kind)
         [LX_SOURCE_SKY] = "sky",
     };
     return bake->desc.combined ? "combined" : names[kind];
+}
+
+static const char *denoiser_name(const lx_bake *bake)
+{
+    static const char *const names[] = {[LX_DENOISE_NONE] = "none", [LX_DENOISE_BUILTIN] = "builtin", [LX_DENOISE_OIDN] = "oidn"};
+    return bake->desc.integrator == LX_INTEGRATOR_PATH ? "none" : names[bake->desc.denoise]; // paths are never denoised
 }
 
 // Every monitor, also those that share their layers with others.
@@ -137,7 +119,9 @@ static lx_result describe(const lx_bake *bake, lx_manifest *manifest, lx_error *
         .bake = {
             .samples = bake->desc.samples,
             .bounces = bake->desc.direct_only ? 0 : bake->desc.transport.bounces,
-            .integrator = "path",
+            .integrator = bake->desc.integrator == LX_INTEGRATOR_PATH ? "path" : "gather",
+            .denoise = denoiser_name(bake),
+            .noise = bake->summary.noise,
             .seed = bake->desc.transport.seed,
             .isa = bake->tracer ? lx_tracer_isa(bake->tracer) : "",
             .seconds = bake->summary.seconds,
@@ -288,7 +272,7 @@ static void list_rects(const lx_bake *bake, pack_tables *tables)
 }
 
 // `ranges`: [layer_count].
-static lx_result begin_pack(const lx_bake *bake, const lx_manifest *manifest, const layer_range *ranges, uint32_t level_count,
+static lx_result begin_pack(const lx_bake *bake, const lx_manifest *manifest, const lx_layer_range *ranges, uint32_t level_count,
                             lx_pack_writer **out, lx_error *error)
 {
     pack_tables tables = {
@@ -366,9 +350,15 @@ static lx_result write_page(lx_bake *bake, uint32_t page, uint32_t level_count, 
 {
     lx_result result = LX_OK;
     lx_page_mips mips = {0};
+    float *image = lx_malloc_array((size_t)bake->atlas->page_size * bake->atlas->page_size, 3 * sizeof *image);
+    if (!image) {
+        result = lx_fail_memory(error, "page");
+        goto cleanup;
+    }
     LX_TRY(lx_page_mips_create(bake, page, level_count, &mips, error));
     for (uint32_t layer = 0; layer < bake->layer_count; ++layer) {
-        lx_page_mips_build(&mips, lx_bake_image(bake, page, layer));
+        LX_TRY(lx_finished_image(bake->finished, page, layer, image, error));
+        lx_page_mips_build(&mips, image);
         for (uint32_t level = 0; level < level_count; ++level)
             LX_TRY(lx_pack_add_image(pack, page, layer, level, mips.rgb[level], error));
         LX_TRY(lx_lightmap_writer_add(lightmaps, page, layer, &mips, error));
@@ -376,6 +366,7 @@ static lx_result write_page(lx_bake *bake, uint32_t page, uint32_t level_count, 
     }
 cleanup:
     lx_page_mips_release(&mips);
+    lx_free(image);
     return result;
 }
 
@@ -387,7 +378,7 @@ lx_result lx_bake_write(lx_bake *bake, const lx_save_desc *desc, const lx_new_fo
     lx_pack_writer *pack = NULL;
     lx_lightmap_writer *lightmaps = NULL;
     const uint32_t level_count = lx_pack_level_count(bake->atlas->page_size, bake->atlas->padding);
-    layer_range *ranges = lx_calloc_array(bake->layer_count, sizeof *ranges);
+    lx_layer_range *ranges = lx_calloc_array(bake->layer_count, sizeof *ranges);
     float *scales = lx_calloc_array(bake->layer_count, sizeof *scales);
     save_progress steps = {progress, lx_seconds(), 0, (uint64_t)bake->atlas->page_count * bake->layer_count + 2};
     if (!ranges || !scales) {
@@ -399,7 +390,7 @@ lx_result lx_bake_write(lx_bake *bake, const lx_save_desc *desc, const lx_new_fo
     LX_TRY(write_sky(bake, folder, &manifest, error));
     LX_TRY(advance(&steps, error));
     for (uint32_t i = 0; i < bake->layer_count; ++i) {
-        ranges[i] = measure_layer(bake, i);
+        LX_TRY(lx_finished_range(bake->finished, i, &ranges[i], error));
         scales[i] = ktx2_scale(ranges[i].largest);
         if (desc->formats & LX_LIGHTMAP_KTX2) manifest.layers[i].scale = scales[i];
     }

@@ -8,15 +8,25 @@
 #include <jansson.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 _Static_assert(LX_LIGHTMAP_KTX2 == 1 << 0 && LX_LIGHTMAP_EXR == 1 << 1 && LX_LIGHTMAP_HDR == 1 << 2,
                "--format lists its words in the order of these bits");
 
 enum { quality_draft, quality_medium, quality_high };
-static const uint32_t quality_samples[] = {[quality_draft] = 64, [quality_medium] = 256, [quality_high] = 1024};
+static const struct {
+    uint32_t samples;
+    float noise;
+} presets[] = {[quality_draft] = {64, 0.05f}, [quality_medium] = {256, 0.02f}, [quality_high] = {1024, 0.01f}};
 
-enum { samples_max = 16 * 1024 * 1024 };
+static const char *const integrator_names[] = {[LX_INTEGRATOR_GATHER] = "gather", [LX_INTEGRATOR_PATH] = "path"};
+static const char *const denoiser_names[] = {[LX_DENOISE_NONE] = "none", [LX_DENOISE_BUILTIN] = "builtin", [LX_DENOISE_OIDN] = "oidn"};
+_Static_assert(LX_INTEGRATOR_GATHER == 0 && LX_INTEGRATOR_PATH == 1 && LX_DENOISE_NONE == 0 && LX_DENOISE_BUILTIN == 1 && LX_DENOISE_OIDN == 2,
+               "--integrator and --denoise list their words in this order");
+
+enum { samples_max = 16 * 1024 * 1024, path_bounces = 8 };
+static const uint32_t not_given = UINT32_MAX - 1; // nobody can type so many bounces
 
 typedef struct bake_options {
     cli_session session;
@@ -26,11 +36,53 @@ typedef struct bake_options {
     lx_bake_desc bake;
     lx_save_desc save;
     const char *scene_path, *output;
-    const char *integrator;
     int quality, layers, encoding, light_units;
-    uint32_t samples; // 0: what the quality says
+    int integrator, denoise; // -1: not given
+    uint32_t samples;        // 0: what the quality says
+    float noise;             // -1: likewise
+    double time_s;           // 0: not given
+    uint64_t memory_bytes;   // likewise
+    char *scratch_folder;    // owned
     bool no_preview, no_report, json;
 } bake_options;
+
+// What only the gather integrator knows how to do; NULL: nothing of it was asked for.
+static const char *gather_option(const bake_options *o)
+{
+    return o->noise >= 0.0f ? "noise" : o->time_s > 0.0 ? "time" : o->memory_bytes > 0 ? "memory" : o->denoise >= 0 ? "denoise" : NULL;
+}
+
+// Beside the result, where there is room for much if there is room for that; TMPDIR goes before it.
+static char *folder_beside(const char *output)
+{
+    const char *const chosen = getenv("TMPDIR");
+    if (chosen && *chosen) return NULL;
+    size_t length = strlen(output);
+    while (length > 1 && output[length - 1] == '/') --length;
+    while (length > 0 && output[length - 1] != '/') --length;
+    char *const folder = malloc(length + 3);
+    if (!folder) return NULL;
+    memcpy(folder, output, length);
+    strcpy(folder + length, length ? "." : "./");
+    return folder;
+}
+
+static int choose_quality(const cli_command *command, bake_options *o)
+{
+    if (o->integrator >= 0) o->bake.integrator = (lx_integrator)o->integrator;
+    const bool paths = o->bake.integrator == LX_INTEGRATOR_PATH;
+    const char *const refused = paths ? gather_option(o) : NULL;
+    if (refused) return cli_usage_error(command, "--%s is for --integrator gather only", refused);
+    if (o->transport.desc.bounces == not_given) o->transport.desc.bounces = paths ? path_bounces : LX_BOUNCES_INF;
+    o->bake.samples = o->samples ? o->samples : presets[o->quality].samples;
+    o->bake.noise = o->noise >= 0.0f ? o->noise : presets[o->quality].noise;
+    o->bake.time_s = o->time_s;
+    o->bake.memory_bytes = o->memory_bytes;
+    if (o->denoise >= 0) o->bake.denoise = (lx_denoiser)o->denoise;
+    if (paths) o->bake.denoise = LX_DENOISE_NONE;
+    if (o->memory_bytes) o->bake.scratch_folder = o->scratch_folder = folder_beside(o->output);
+    return CLI_GO_ON;
+}
 
 static int parse(const cli_command *command, int argc, char **argv, bake_options *o)
 {
@@ -56,13 +108,21 @@ static int parse(const cli_command *command, int argc, char **argv, bake_options
          .help = "texels between charts (default 4)"},
         {.kind = CLI_HEADING, .help = "Quality"},
         {.name = "quality", .argument = "draft|medium|high", .kind = CLI_CHOICE, .target = &o->quality,
-         .help = "64, 256 or 1024 samples (default medium)"},
+         .help = "presets of the next two: 64, 256 or 1024 samples, noise 0.05, 0.02 or 0.01 (default medium)"},
         {.name = "samples", .argument = "N", .kind = CLI_UINT, .target = &o->samples, .min = 1, .max = samples_max,
-         .help = "paths per texel; four times as many halve the noise"},
-        {.name = "integrator", .argument = "path", .kind = CLI_TEXT, .target = &o->integrator,
-         .help = "how light is followed; path is the only one so far"},
+         .help = "rays per texel at most; four times as many halve the noise"},
+        {.name = "noise", .argument = "E", .kind = CLI_FLOAT, .target = &o->noise, .max = 1,
+         .help = "where every layer's error is estimated below that, 0.02 meaning 2 %, no more samples are taken; 0: take them all"},
+        {.name = "time", .argument = "DURATION", .kind = CLI_DURATION, .target = &o->time_s, .max = 1e9,
+         .help = "take no new samples once that much time has passed: 90s, 5m, 1h30m. The result then depends on the machine"},
+        {.name = "denoise", .argument = "none|builtin|oidn", .kind = CLI_CHOICE, .target = &o->denoise,
+         .help = "smooth what noise is left; oidn: by Intel Open Image Denoise, where its library is installed (default builtin)"},
+        {.name = "integrator", .argument = "gather|path", .kind = CLI_CHOICE, .target = &o->integrator,
+         .help = "how light is followed. gather: fast, one ray serves all layers and bounces; path: every texel by paths of its own, slow and "
+                 "free of bias, for reference; it knows no --noise, --time, --denoise and --memory (default "
+                 "gather)"},
         {.kind = CLI_HEADING, .help = "Light"},
-        CLI_TRANSPORT_OPTIONS(o->transport),
+        CLI_TRANSPORT_OPTIONS(o->transport, "inf; with --integrator path 8"),
         {.name = "direct-only", .kind = CLI_FLAG, .target = &o->bake.direct_only, .help = "leave out what bounces"},
         {.name = "indirect-only", .kind = CLI_FLAG, .target = &o->bake.indirect_only,
          .help = "leave out what comes straight from a source"},
@@ -73,14 +133,15 @@ static int parse(const cli_command *command, int argc, char **argv, bake_options
         {.name = "max-layers", .argument = "N", .kind = CLI_UINT, .target = &o->bake.max_layers, .min = 1, .max = 65535,
          .help = "more sources are grouped by material, then by parent (default 64)"},
         {.kind = CLI_HEADING, .help = "Machine"},
+        {.name = "memory", .argument = "SIZE", .kind = CLI_SIZE, .target = &o->memory_bytes,
+         .help = "stay below that: 2G, 1500M. Layers are baked in groups, one after the other, with the same result; finished ones wait in a file where "
+                 "TMPDIR says, else beside OUT"},
         CLI_SESSION_OPTIONS(o->session),
     };
     int status = cli_parse(command, options, CLI_COUNT(options), argc, argv, &o->scene_path, 1, 1);
     if (status != CLI_GO_ON) return status;
 
     if (!o->output) return cli_usage_error(command, "where to? Give a folder with -o OUT");
-    if (strcmp(o->integrator, "path") != 0)
-        return cli_usage_error(command, "--integrator: '%s' does not exist; path is the only one so far", o->integrator);
     if (o->atlas.page_size % 4 != 0)
         return cli_usage_error(command, "--page-size: %" PRIu32 " is no multiple of 4", o->atlas.page_size);
     if (o->bake.direct_only && o->bake.indirect_only)
@@ -91,11 +152,11 @@ static int parse(const cli_command *command, int argc, char **argv, bake_options
         return cli_usage_error(command, "--encoding rgb9e5 is for --format ktx2 only");
     if (o->encoding != LX_ENCODING_DEFAULT && !o->save.formats)
         return cli_usage_error(command, "--encoding without --format has nothing to encode");
-    status = cli_transport_check(command, &o->transport);
+    status = choose_quality(command, o);
+    if (status == CLI_GO_ON) status = cli_transport_check(command, &o->transport);
     if (status != CLI_GO_ON) return status;
 
     o->bake.transport = o->transport.desc;
-    o->bake.samples = o->samples ? o->samples : quality_samples[o->quality];
     o->bake.combined = o->layers == 1;
     o->save.encoding = (lx_encoding)o->encoding;
     o->save.preview = !o->no_preview;
@@ -109,28 +170,59 @@ static const char *plural(uint64_t count)
     return count == 1 ? "" : "s";
 }
 
+// Parts of the bake that there were: ": direct 1.0 s, gather 5.3 s", or "".
+static void format_parts(char *out, size_t size, const lx_stage_seconds *s)
+{
+    const struct {
+        const char *name;
+        double seconds;
+    } parts[] = {{"direct", s->direct}, {"cache", s->cache}, {"gather", s->gather}, {"denoise", s->denoise}};
+    *out = '\0';
+    for (size_t i = 0, length = 0; i < CLI_COUNT(parts) && length < size; ++i) {
+        char seconds[32];
+        if (parts[i].seconds <= 0.0) continue;
+        cli_format_seconds(seconds, parts[i].seconds);
+        length += (size_t)snprintf(out + length, size - length, "%s%s %s", length ? ", " : ": ", parts[i].name, seconds);
+    }
+}
+
+static void print_quality(const bake_options *o, const lx_bake_summary *s)
+{
+    char bounces[16];
+    if (o->bake.transport.bounces == LX_BOUNCES_INF)
+        snprintf(bounces, sizeof bounces, "inf");
+    else
+        snprintf(bounces, sizeof bounces, "%" PRIu32, o->bake.transport.bounces);
+    printf("  light     %" PRIu32 " layer%s from %" PRIu32 " source%s, %" PRIu32 " samples, %s bounces\n", s->layer_count,
+           plural(s->layer_count), s->source_count, plural(s->source_count), o->bake.samples, bounces);
+    printf("  quality   %s", integrator_names[o->bake.integrator]);
+    if (s->noise > 0.0f) printf(", noise %.2g %% estimated", 100.0 * (double)s->noise);
+    if (o->bake.denoise != LX_DENOISE_NONE) printf(", then denoised (%s)", denoiser_names[o->bake.denoise]);
+    putchar('\n');
+}
+
 static void print_summary(const bake_options *o, const lx_bake_summary *s)
 {
     const double total = lx_host_seconds() - o->session.start_seconds;
-    char seconds[32], total_seconds[32], rays[32], rate[32], pack[32], memory[32], bounces[16];
+    char seconds[32], total_seconds[32], rays[32], rate[32], pack[32], memory[32], predicted[32], parts[128];
     cli_format_seconds(seconds, s->seconds);
     cli_format_seconds(total_seconds, total);
     cli_format_count(rays, (double)s->ray_count);
     cli_format_count(rate, s->seconds > 0.0 ? (double)s->ray_count / s->seconds : 0.0);
     cli_format_bytes(pack, s->pack_bytes);
     cli_format_bytes(memory, lx_host_peak_memory());
-    if (o->bake.transport.bounces == LX_BOUNCES_INF)
-        snprintf(bounces, sizeof bounces, "inf");
-    else
-        snprintf(bounces, sizeof bounces, "%" PRIu32, o->bake.transport.bounces);
+    cli_format_bytes(predicted, s->predicted_bytes);
+    format_parts(parts, sizeof parts, &s->stages);
 
     printf("%s\n", o->output);
     printf("  lightmap  %" PRIu32 " page%s of %" PRIu32 " x %" PRIu32 ", %.1f %% covered, %.3g texels/m\n", s->page_count,
            plural(s->page_count), s->page_size, s->page_size, 100.0 * (double)s->coverage, (double)s->texels_per_m);
-    printf("  light     %" PRIu32 " layer%s from %" PRIu32 " source%s, %" PRIu32 " samples, %s bounces\n", s->layer_count,
-           plural(s->layer_count), s->source_count, plural(s->source_count), o->bake.samples, bounces);
-    printf("  time      %s of baking, %s in all; %s rays, %s rays/s; %s of memory\n", seconds, total_seconds, rays, rate,
-           memory);
+    print_quality(o, s);
+    printf("  time      %s of baking%s; %s in all; %s rays, %s rays/s\n", seconds, parts, total_seconds, rays, rate);
+    printf("  machine   %s of memory at most", memory);
+    if (s->predicted_bytes) printf(", %s predicted", predicted);
+    if (s->group_count > 1) printf("; layers in %" PRIu32 " groups", s->group_count);
+    putchar('\n');
     printf("  pack      %s/luxel.pack, %s\n", o->output, pack);
     cli_print_budget(&s->budget);
     if (o->save.report) printf("  report    %s/report.html\n", o->output);
@@ -150,26 +242,30 @@ static json_t *budget_json(const lx_budget *b)
 
 static json_t *stages_json(const lx_stage_seconds *s)
 {
-    return json_pack("{s:f, s:f, s:f, s:f, s:f, s:f, s:f}", "import", s->import, "unwrap", s->unwrap, "luxels", s->luxels, "bake", s->bake,
-                     "post", s->post, "save", s->save, "preview", s->preview);
+    return json_pack("{s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:f}", "import", s->import, "unwrap", s->unwrap, "luxels", s->luxels,
+                     "bake", s->bake, "direct", s->direct, "cache", s->cache, "gather", s->gather, "denoise", s->denoise, "post", s->post, "save", s->save,
+                     "preview", s->preview);
 }
 
 static int print_json(const bake_options *o, const lx_bake_summary *s)
 {
     json_t *const root = json_pack(
-        "{s:s, s:s, s:I, s:I, s:f, s:f, s:I, s:I, s:I, s:o, s:I, s:I, s:I, s:I, s:f, s:f, s:f, s:I, s:I, s:o, s:o, s:s?, s:s?, s:f, s:I}",
+        "{s:s, s:s, s:I, s:I, s:f, s:f, s:I, s:I, s:s, s:I, s:o, s:o, s:s, s:I, s:I, s:I, s:I, s:f, s:f, s:f, s:I, s:I, s:I, s:I, s:o, s:o, s:s?, s:s?, "
+        "s:f, s:I}",
         "scene", o->scene_path, "folder", o->output,
         "pages", (json_int_t)s->page_count, "page_size", (json_int_t)s->page_size,
         "coverage", (double)s->coverage, "texels_per_meter", (double)s->texels_per_m,
         "layers", (json_int_t)s->layer_count, "sources", (json_int_t)s->source_count,
-        "samples", (json_int_t)o->bake.samples,
+        "integrator", integrator_names[o->bake.integrator], "samples", (json_int_t)o->bake.samples,
         "bounces", o->bake.transport.bounces == LX_BOUNCES_INF ? json_string("inf")
                                                                : json_integer(o->bake.transport.bounces),
+        "noise", s->noise > 0.0f ? json_real((double)s->noise) : json_null(), "denoise", denoiser_names[o->bake.denoise],
         "texels", (json_int_t)s->texel_count, "invalid_texels", (json_int_t)s->invalid_count,
         "paths", (json_int_t)s->path_count, "rays", (json_int_t)s->ray_count,
         "seconds", s->seconds, "total_seconds", lx_host_seconds() - o->session.start_seconds,
         "rays_per_second", s->seconds > 0.0 ? (double)s->ray_count / s->seconds : 0.0,
         "pack_bytes", (json_int_t)s->pack_bytes, "peak_memory_bytes", (json_int_t)lx_host_peak_memory(),
+        "predicted_memory_bytes", (json_int_t)s->predicted_bytes, "groups", (json_int_t)s->group_count,
         "memory", budget_json(&s->budget), "stages", stages_json(&s->stages),
         "report", o->save.report ? "report.html" : NULL, "preview", o->save.preview ? "preview.png" : NULL, "view_ev", (double)s->view_ev,
         "warnings", (json_int_t)o->session.warning_count);
@@ -188,9 +284,13 @@ static int run(const cli_command *command, int argc, char **argv)
     bake_options o = {.session = cli_session_default(), .transport = cli_transport_default(),
                       .load = lx_scene_load_desc_default(), .atlas = lx_atlas_desc_default(),
                       .bake = lx_bake_desc_default(), .save = lx_save_desc_default(),
-                      .integrator = "path", .quality = quality_medium};
+                      .quality = quality_medium, .integrator = -1, .denoise = -1, .noise = -1.0f};
+    o.transport.desc.bounces = not_given;
     int status = parse(command, argc, argv, &o);
-    if (status != CLI_GO_ON) return status;
+    if (status != CLI_GO_ON) {
+        free(o.scratch_folder);
+        return status;
+    }
 
     lx_error error = {0};
     lx_scene *scene = NULL;
@@ -227,6 +327,7 @@ cleanup:
     lx_atlas_destroy(atlas);
     lx_scene_destroy(scene);
     cli_session_close(&o.session);
+    free(o.scratch_folder);
     return status;
 }
 
@@ -239,6 +340,9 @@ const cli_command cli_bake = {
     .examples = "  luxel bake room.glb -o room.baked\n"
                 "  luxel bake room.glb -o room.baked --quality draft --page-size 512\n"
                 "  luxel bake house.glb -o house.baked --sky noon.hdr --max-pages 4\n"
+                "  luxel bake house.glb -o house.baked --quality high --time 30m\n"
+                "  luxel bake club.glb -o club.baked --max-layers 300 --memory 4G\n"
+                "  luxel bake room.glb -o truth.baked --integrator path --samples 4096\n"
                 "  luxel bake bar.glb -o bar.baked --format ktx2,exr --encoding half\n",
     .run = run,
 };

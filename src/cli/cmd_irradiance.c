@@ -146,7 +146,7 @@ static int run(const cli_command *command, int argc, char **argv)
          .help = "default: standard output"},
         {.name = "samples", .argument = "N", .kind = CLI_UINT, .target = &samples, .min = 1, .max = 16 * 1024 * 1024,
          .help = "paths per point (default 1024)"},
-        CLI_TRANSPORT_OPTIONS(transport),
+        CLI_TRANSPORT_OPTIONS(transport, "8"),
         {.name = "light-units", .argument = "gltf|blender", .kind = CLI_CHOICE, .target = &light_units,
          .help = "blender: emission x 683, to match what Blender's exporter does to lamps (default gltf)"},
         CLI_SESSION_OPTIONS(session),

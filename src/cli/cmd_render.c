@@ -92,7 +92,7 @@ static int parse(const cli_command *command, int argc, char **argv, render_optio
         {.kind = CLI_HEADING, .help = "Light (of the reference, and of what is not baked)"},
         {.name = "reference", .kind = CLI_FLAG, .target = &o->reference,
          .help = "path-trace instead of using the lightmaps; always so for a scene"},
-        CLI_TRANSPORT_OPTIONS(o->transport),
+        CLI_TRANSPORT_OPTIONS(o->transport, "8"),
         {.name = "light-units", .argument = "gltf|blender", .kind = CLI_CHOICE, .target = &o->light_units,
          .help = "for a scene: blender multiplies emission by 683 (default gltf)"},
         {.kind = CLI_HEADING, .help = "Machine"},

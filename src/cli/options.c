@@ -172,6 +172,74 @@ static int store_float(const cli_command *command, const cli_option *option, con
     return status;
 }
 
+// Digits with at most one point, nothing else: strtod would take "inf", "0x1p3" and " 7". Returns what follows; NULL: no number.
+static const char *read_decimal(const char *text, double *out)
+{
+    char digits[64];
+    const size_t length = strspn(text, "0123456789.");
+    if (length == 0 || length >= sizeof digits) return NULL;
+    memcpy(digits, text, length);
+    digits[length] = '\0';
+    char *end = NULL;
+    *out = strtod(digits, &end);
+    return *end ? NULL : text + length;
+}
+
+// Hours, minutes, seconds in this order, none twice; a number without a unit is seconds.
+static bool parse_duration(const char *text, double *out)
+{
+    static const char units[] = "hms";
+    static const double seconds[] = {3600, 60, 1};
+    size_t next = 0;
+    *out = 0;
+    for (const char *c = text; *c;) {
+        double value;
+        c = read_decimal(c, &value);
+        if (!c) return false;
+        const char *const unit = *c ? strchr(units + next, *c) : &units[2];
+        if (!unit || (!*c && next > 0)) return false; // "1h30": of what?
+        *out += value * seconds[unit - units];
+        next = (size_t)(unit - units) + 1;
+        if (*c) ++c;
+    }
+    return *text && *out > 0;
+}
+
+static int store_duration(const cli_command *command, const cli_option *option, const char *text)
+{
+    double seconds;
+    if (!parse_duration(text, &seconds))
+        return cli_usage_error(command, "--%s: '%s' is no duration: 90, 90s, 5m and 1h30m are", option->name, text);
+    const int status = check_range(command, option, seconds, text);
+    if (status == CLI_GO_ON) *(double *)option->target = seconds;
+    return status;
+}
+
+static bool parse_size(const char *text, double *out)
+{
+    static const char units[] = "kmgt";
+    const char *unit = read_decimal(text, out);
+    if (!unit) return false;
+    if (*unit && strcmp(unit, "B") != 0) {
+        const char *const found = strchr(units, tolower((unsigned char)*unit));
+        if (!found) return false;
+        for (const char *u = units; u <= found; ++u) *out *= 1024;
+        ++unit;
+        if (*unit && strcmp(unit, "B") != 0 && strcmp(unit, "iB") != 0) return false;
+    }
+    return *out >= 1;
+}
+
+static int store_size(const cli_command *command, const cli_option *option, const char *text)
+{
+    double bytes;
+    if (!parse_size(text, &bytes))
+        return cli_usage_error(command, "--%s: '%s' is no size: 2G, 1500M and a number of bytes are", option->name, text);
+    if (bytes >= 0x1p63) return cli_usage_error(command, "--%s: %s is too large", option->name, text);
+    *(uint64_t *)option->target = (uint64_t)bytes;
+    return CLI_GO_ON;
+}
+
 static int store_choices(const cli_command *command, const cli_option *option, const char *text)
 {
     uint32_t bits = 0;
@@ -209,6 +277,8 @@ static int store(const cli_command *command, const cli_option *option, const cha
         return store_uint(command, option, text);
     case CLI_UINT: return store_uint(command, option, text);
     case CLI_FLOAT: return store_float(command, option, text);
+    case CLI_DURATION: return store_duration(command, option, text);
+    case CLI_SIZE: return store_size(command, option, text);
     case CLI_CHOICE: {
         const int index = find_word(option->argument, '|', text, strlen(text));
         if (index < 0)

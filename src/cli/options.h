@@ -22,6 +22,8 @@ typedef enum cli_kind {
     CLI_UINT,        ///< uint32_t in [min, max].
     CLI_UINT_OR_INF, ///< The same; the word "inf" gives UINT32_MAX.
     CLI_FLOAT,       ///< float in [min, max], finite.
+    CLI_DURATION,    ///< double, seconds: "90", "90s", "5m", "1h30m". More than 0.
+    CLI_SIZE,        ///< uint64_t, bytes: "2G", "1.5GiB", "1500M", "64k", or a plain number. Powers of 1024. More than 0.
     CLI_CHOICE,      ///< int, the position of the word in `argument` ("draft|medium|high").
     CLI_CHOICES,     ///< uint32_t, bit i for word i; words are given with commas ("ktx2,exr").
 } cli_kind;

@@ -48,9 +48,10 @@ typedef struct cli_transport {
     const char *sky; ///< COLOUR or FILE; NULL: none.
 } cli_transport;
 
-#define CLI_TRANSPORT_OPTIONS(transport)                                                                               \
-    {.name = "bounces", .argument = "N|inf", .kind = CLI_UINT_OR_INF, .target = &(transport).desc.bounces,             \
-     .help = "how often light bounces; 0: direct light only; inf: until chance ends the path, without bias (default 8)"}, \
+/// `default_bounces`: what the help calls the default.
+#define CLI_TRANSPORT_OPTIONS(transport, default_bounces)                                                              \
+    {.name = "bounces", .argument = "N|inf", .kind = CLI_UINT_OR_INF, .target = &(transport).desc.bounces, .max = 1e6, \
+     .help = "how often light bounces; 0: direct light only; inf: all bounces (default " default_bounces ")"},         \
     {.name = "coloured-shadows", .kind = CLI_FLAG, .target = &(transport).desc.coloured_shadows,                       \
      .help = "blended surfaces tint the light that passes"},                                                           \
     {.name = "seed", .argument = "N", .kind = CLI_UINT, .target = &(transport).desc.seed,                              \

@@ -176,8 +176,11 @@ static const struct {
     {"import", offsetof(lx_stage_seconds, import)}, {"unwrap", offsetof(lx_stage_seconds, unwrap)},
     {"luxels", offsetof(lx_stage_seconds, luxels)}, {"bake", offsetof(lx_stage_seconds, bake)},
     {"post", offsetof(lx_stage_seconds, post)},     {"save", offsetof(lx_stage_seconds, save)},
-    {"preview", offsetof(lx_stage_seconds, preview)},
+    {"preview", offsetof(lx_stage_seconds, preview)}, {"direct", offsetof(lx_stage_seconds, direct)},
+    {"cache", offsetof(lx_stage_seconds, cache)},   {"gather", offsetof(lx_stage_seconds, gather)},
+    {"denoise", offsetof(lx_stage_seconds, denoise)},
 };
+enum { part_fields = 7 }; // from here on: parts of the bake, left out where there is none
 
 static double *stage_field(lx_stage_seconds *stages, size_t index)
 {
@@ -189,7 +192,7 @@ static json_t *write_stages(lx_stage_seconds stages)
     json_t *object = json_object();
     bool ok = object != NULL;
     for (size_t i = 0; i < sizeof stage_fields / sizeof *stage_fields; ++i)
-        ok = ok && put(object, stage_fields[i].key, real(*stage_field(&stages, i)));
+        ok = ok && ((i >= part_fields && *stage_field(&stages, i) == 0) || put(object, stage_fields[i].key, real(*stage_field(&stages, i))));
     if (ok) return object;
     json_decref(object);
     return NULL;
@@ -213,7 +216,8 @@ static json_t *write_bake(const lx_manifest_bake *bake)
     json_t *object = json_object();
     if (put(object, "samples", json_integer(bake->samples)) &&
         put(object, "bounces", bake->bounces == LX_BOUNCES_INF ? json_string("inf") : json_integer(bake->bounces)) &&
-        put(object, "integrator", text(bake->integrator)) && put(object, "seed", json_integer(bake->seed)) &&
+        put(object, "integrator", text(bake->integrator)) && put(object, "denoise", text(bake->denoise)) &&
+        (!(bake->noise > 0) || put(object, "noise", real((double)bake->noise))) && put(object, "seed", json_integer(bake->seed)) &&
         put(object, "isa", text(bake->isa)) && put(object, "seconds", real(bake->seconds)) &&
         put(object, "stages", write_stages(bake->stages)) &&
         put(object, "threads", json_integer(bake->threads)))
@@ -565,6 +569,8 @@ static lx_result read_bake(const reader *r, const json_t *root)
     else
         LX_TRY(get_uint(r, object, "bake", "bounces", false, &bake->bounces));
     LX_TRY(get_text(r, object, "bake", "integrator", "", &bake->integrator));
+    LX_TRY(get_text(r, object, "bake", "denoise", "", &bake->denoise));
+    LX_TRY(get_float(r, object, "bake", "noise", false, &bake->noise));
     LX_TRY(get_uint(r, object, "bake", "seed", false, &bake->seed));
     LX_TRY(get_text(r, object, "bake", "isa", "", &bake->isa));
     LX_TRY(get_float(r, object, "bake", "seconds", false, &seconds));

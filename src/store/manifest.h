@@ -55,7 +55,9 @@ typedef struct lx_manifest_animation {
 
 typedef struct lx_manifest_bake {
     uint32_t samples, bounces; ///< LX_BOUNCES_INF is written as "inf".
-    const char *integrator;
+    const char *integrator; ///< "gather", "path".
+    const char *denoise;    ///< "none", "builtin", "oidn".
+    float noise;            ///< Estimated relative standard error before denoising; 0: not known, and not written.
     uint32_t seed;
     const char *isa;
     double seconds;

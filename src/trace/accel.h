@@ -13,6 +13,7 @@ typedef struct lx_accel_mesh {
     const uint32_t *indices;
     uint32_t vertex_count, triangle_count;
     bool has_holes;     ///< Some hits may be holes (cutouts): asks `is_hole`.
+    bool mirrored;      ///< The front side is the one from which the corners run clockwise.
     bool transmits;     ///< Some light may pass: asks `transmittance` on shadow rays.
     float front;        ///< The side that triangles show to the outside: 1 where they are counter-clockwise, -1 clockwise, 0: both sides are outside.
 } lx_accel_mesh;

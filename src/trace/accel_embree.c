@@ -1,12 +1,14 @@
 // Embree 3 behind accel.h.
 //
-// Shadow rays go through Embree's stream entry point in batches, which runs about twice as fast as ray by ray; closest hits go
-// one by one, which loses little and always computes the same t for the same ray and triangle. The BVH has medium quality (the
+// Shadow rays go through Embree's stream entry point in batches, which runs about twice as fast as ray by ray. Closest hits go in packets of
+// eight, which takes 5 to 15 % less than one by one whatever the order (longer streams gain less, sorting by direction costs more than it gains) and
+// computes the same t, u and v for the same ray and triangle; the COHERENT flag does not, and is slower. The BVH has medium quality (the
 // high-quality one hurts any-hit queries) and is built by one thread: its topology decides ties between triangles at equal
 // distance, and the same input must give the same bits.
 #include "trace/accel.h"
 
 #include "base/error.h"
+#include "base/memory.h"
 
 #include <embree3/rtcore.h>
 #include <string.h>
@@ -16,11 +18,12 @@ struct lx_accel {
     RTCScene scene;
     lx_accel_surface_queries queries;
     lx_accel_mesh *meshes; // for queries about what is near
+    float *orientation; // [mesh] -1: mirrored
     bool any_filter;
     char isa[16];
 };
 
-enum { batch_size = 256, remembered_triangles = 12 };
+enum { batch_size = 256, packet_size = 8, remembered_triangles = 12 };
 
 // What a shadow ray has crossed so far. Embree may report one triangle to a filter more than once (a BVH with spatial splits
 // or a stream that is replayed), so triangles that were counted are remembered.
@@ -166,6 +169,12 @@ lx_result lx_accel_create(const lx_accel_mesh *meshes, uint32_t mesh_count, lx_a
         goto cleanup;
     }
     if (mesh_count > 0) memcpy(accel->meshes, meshes, mesh_count * sizeof *meshes);
+    accel->orientation = lx_calloc_array(mesh_count, sizeof *accel->orientation);
+    if (!accel->orientation) {
+        result = lx_fail_memory(error, "ray tracing structure");
+        goto cleanup;
+    }
+    for (uint32_t i = 0; i < mesh_count; ++i) accel->orientation[i] = meshes[i].mirrored ? -1.0f : 1.0f;
     char config[64] = "threads=1,set_affinity=0";
     if (isa[0]) {
         strcat(config, ",isa=");
@@ -200,6 +209,7 @@ void lx_accel_destroy(lx_accel *accel)
     if (accel->scene) rtcReleaseScene(accel->scene);
     if (accel->device) rtcReleaseDevice(accel->device);
     lx_free(accel->meshes);
+    lx_free(accel->orientation);
     lx_free(accel);
 }
 
@@ -222,21 +232,67 @@ static struct RTCRay make_ray(const lx_ray *ray, unsigned id)
                            .tfar = ray->t_max, .mask = 0xffffffffu, .id = id};
 }
 
+// Embree's Ng follows the corners' order by the right hand, as glTF's front side does, but for mirrored instances.
+static bool is_back(const lx_accel *accel, unsigned mesh, float along_normal)
+{
+    return along_normal * accel->orientation[mesh] >= 0;
+}
+
 static lx_hit intersect_one(const lx_accel *accel, ray_context *context, const lx_ray *ray)
 {
     struct RTCRayHit query = {.ray = make_ray(ray, 0)};
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
     rtcIntersect1(accel->scene, &context->embree, &query);
-    const float along = query.hit.Ng_x * ray->direction.x + query.hit.Ng_y * ray->direction.y + query.hit.Ng_z * ray->direction.z;
-    return (lx_hit){.surface = query.hit.geomID, .triangle = query.hit.primID, .t = query.ray.tfar, .u = query.hit.u,
-                    .v = query.hit.v, .back = along > 0};
+    lx_hit hit = {.surface = query.hit.geomID, .triangle = query.hit.primID, .t = query.ray.tfar, .u = query.hit.u, .v = query.hit.v};
+    if (hit.surface == LX_MISS) return hit;
+    const lx_vec3 normal = {query.hit.Ng_x, query.hit.Ng_y, query.hit.Ng_z};
+    hit.back = is_back(accel, hit.surface, lx_dot(normal, ray->direction));
+    return hit;
+}
+
+// `count` <= packet_size rays. What is not there repeats the last ray, masked out.
+static void intersect_packet(const lx_accel *accel, ray_context *context, const lx_ray *rays, lx_hit *hits, unsigned count)
+{
+    struct RTCRayHit8 q;
+    _Alignas(32) int valid[packet_size];
+    for (unsigned i = 0; i < packet_size; ++i) {
+        const lx_ray *ray = &rays[i < count ? i : count - 1];
+        valid[i] = i < count ? -1 : 0;
+        q.ray.org_x[i] = ray->origin.x;
+        q.ray.org_y[i] = ray->origin.y;
+        q.ray.org_z[i] = ray->origin.z;
+        q.ray.tnear[i] = ray->t_min;
+        q.ray.dir_x[i] = ray->direction.x;
+        q.ray.dir_y[i] = ray->direction.y;
+        q.ray.dir_z[i] = ray->direction.z;
+        q.ray.tfar[i] = ray->t_max;
+        q.ray.time[i] = 0;
+        q.ray.mask[i] = 0xffffffffu;
+        q.ray.id[i] = i;
+        q.ray.flags[i] = 0;
+        q.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+        q.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+    }
+    rtcIntersect8(valid, accel->scene, &context->embree, &q);
+    for (unsigned i = 0; i < count; ++i) {
+        hits[i] = (lx_hit){.surface = q.hit.geomID[i], .triangle = q.hit.primID[i], .t = q.ray.tfar[i], .u = q.hit.u[i], .v = q.hit.v[i]};
+        if (hits[i].surface == LX_MISS) continue;
+        const lx_vec3 normal = {q.hit.Ng_x[i], q.hit.Ng_y[i], q.hit.Ng_z[i]};
+        hits[i].back = is_back(accel, hits[i].surface, lx_dot(normal, rays[i].direction));
+    }
 }
 
 void lx_accel_closest(const lx_accel *accel, const lx_ray *rays, lx_hit *hits, size_t count)
 {
     ray_context context = make_context(accel, NULL);
-    for (size_t i = 0; i < count; ++i) hits[i] = intersect_one(accel, &context, &rays[i]);
+    for (size_t i = 0; i < count; i += packet_size) {
+        const size_t left = count - i;
+        if (left == 1)
+            hits[i] = intersect_one(accel, &context, &rays[i]);
+        else
+            intersect_packet(accel, &context, rays + i, hits + i, left < packet_size ? (unsigned)left : packet_size);
+    }
 }
 
 // Exact for any number of surfaces: one closest hit after the other.

@@ -1,8 +1,15 @@
-// Direct light by tile.
+// Direct light by tile: where to spare shadow rays.
 //
 // Sample i of a luxel starts from site 5 i mod 16: any 16 samples in a row look at every site, any 4 at sites that lie well apart (sites are
-// stratified by their number, so four that differ in both digits to the base 4 are). The luxel's samples are cut into four runs; each is a
-// well-spread set in itself, so what they disagree by tells the variance of their mean.
+// stratified by their number, so four that differ in both digits to the base 4 are).
+//
+// Every luxel sends the rays of its first four samples. Where they all met the same (all clear, all dark, the same pane of glass), in the luxel
+// and in its neighbours, the luxel is taken to see the source so altogether, and its light is that of its samples without further rays. Else it sends the
+// rays of 16 samples, and so do neighbours that turn out to differ from it, until no neighbours differ unlooked-at: the outline of a shadow is followed around.
+// Luxels whose 16 rays differ lie in a penumbra or on an edge and send the rays of all samples. So do those whose looks, with their neighbours', are too few
+// to tell: in narrow charts, and where a few samples carry most of the light.
+//
+// A luxel's samples are cut into four runs. Each is a well-spread set in itself, so what they disagree by tells the variance of their mean.
 #include "trace/direct.h"
 
 #include "base/memory.h"
@@ -12,33 +19,76 @@
 #include <string.h>
 
 enum {
+    tile_edge = 32, most_luxels = tile_edge * tile_edge,
+    grid_edge = tile_edge + 2, // a border of nobody
+    probes = 4,
     ray_batch = 4096,
+    chunk_luxels = 64, // that sum up together
     runs = 4,
     most_monitor_share = 16, cells_per_share = 4,
 };
 
+// Unshadowed light whose mean varies by more, of itself, is looked at in all samples instead of the first 16.
+static const float fine_deviation = 0.004f;
+
+// Looks of equal weight that must agree in a luxel and its neighbours: what they miss is a share of the source below its inverse, mostly.
+static const float enough_looks = 20, enough_own_looks = 6; // the latter of the 16 that a luxel with doubts takes
+
+// One of a luxel's first samples: what would arrive, and what share of it does.
+typedef struct look {
+    lx_rgb light, transmittance;
+    uint32_t cell;
+    bool arrives; // else the receiver or the source turns away
+} look;
+
+typedef enum verdict { sees_nothing, sees_same, sees_both } verdict;
+
+typedef struct luxel_state {
+    verdict verdict;
+    lx_rgb transmittance; // sees_same: of all rays
+    float light, squares; // of the looks: sums of their unshadowed light and its squares
+    uint8_t looked;       // looks taken: probes or lx_direct_sites
+    bool possible;        // the source is not behind all sites' horizons
+    bool listed;
+    bool doubtful;        // sees_same, by too few looks
+} luxel_state;
+
 struct lx_direct_batch {
-    float (*run_sums)[runs]; // [cell] of the luxel in hand: mean of the channels
-    lx_rgb *sums;            // [cell]
+    look looks[most_luxels][lx_direct_sites];
+    luxel_state luxels[most_luxels];
+    uint16_t grid[grid_edge * grid_edge]; // luxel + 1, 0: none
+    uint16_t list[most_luxels], next[most_luxels];
     lx_ray rays[ray_batch];
     lx_rgb light[ray_batch], transmittance[ray_batch];
-    uint32_t cell[ray_batch];
+    uint32_t owner[ray_batch]; // a look, or a sum
     uint8_t run[ray_batch];
     uint64_t ray_count;
+    // Per luxel of a chunk and cell.
+    lx_rgb *sums;
+    float (*run_sums)[runs]; // mean of the channels
 };
+
+// What stays the same for one source in one tile.
+typedef struct job {
+    lx_direct_batch *b;
+    const lx_tracer *tracer;
+    const lx_direct_tile *tile;
+    uint32_t source, key, cells, weight;
+    uint32_t samples; // of a luxel
+} job;
 
 lx_direct_batch *lx_direct_batch_create(const lx_tracer *tracer)
 {
-    uint32_t cells = 1;
+    uint32_t sums = chunk_luxels;
     for (uint32_t s = 0; s < tracer->source_count; ++s) {
-        const uint32_t count = lx_tracer_cell_count(tracer, s);
-        cells = count > cells ? count : cells;
+        const uint32_t cells = lx_tracer_cell_count(tracer, s);
+        sums = cells > sums ? cells : sums;
     }
     lx_direct_batch *b = lx_calloc_array(1, sizeof *b);
     if (!b) return NULL;
-    b->run_sums = lx_calloc_array(cells, sizeof *b->run_sums);
-    b->sums = lx_calloc_array(cells, sizeof *b->sums);
-    if (!b->run_sums || !b->sums) {
+    b->sums = lx_calloc_array(sums, sizeof *b->sums);
+    b->run_sums = lx_calloc_array(sums, sizeof *b->run_sums);
+    if (!b->sums || !b->run_sums) {
         lx_direct_batch_destroy(b);
         return NULL;
     }
@@ -48,8 +98,8 @@ lx_direct_batch *lx_direct_batch_create(const lx_tracer *tracer)
 void lx_direct_batch_destroy(lx_direct_batch *b)
 {
     if (!b) return;
-    lx_free(b->run_sums);
     lx_free(b->sums);
+    lx_free(b->run_sums);
     lx_free(b);
 }
 
@@ -64,39 +114,223 @@ uint32_t lx_direct_sample_weight(const lx_tracer *tracer, uint32_t source)
     return wanted < most_monitor_share ? wanted : most_monitor_share;
 }
 
-static void flush(lx_direct_batch *b, const lx_tracer *tracer, size_t count)
+// ---- tiles and sources --------------------------------------------------------------------------------------------------------
+
+void lx_direct_find_bounds(const lx_direct_tile *tile, lx_direct_bounds *out)
 {
-    lx_trace_transmittance(tracer, b->rays, b->transmittance, count);
-    b->ray_count += count;
+    const size_t count = (size_t)tile->count * lx_direct_sites;
+    lx_bounds box = lx_bounds_empty();
+    lx_vec3 sum = {0, 0, 0};
     for (size_t i = 0; i < count; ++i) {
-        const lx_rgb arrives = lx_rgb_mul(b->light[i], b->transmittance[i]);
-        b->sums[b->cell[i]] = lx_rgb_add(b->sums[b->cell[i]], arrives);
-        b->run_sums[b->cell[i]][b->run[i]] += (arrives.r + arrives.g + arrives.b) * (1.0f / 3);
+        lx_bounds_add(&box, tile->sites[i].position);
+        sum = lx_add(sum, tile->sites[i].geometric_normal);
+    }
+    *out = (lx_direct_bounds){.centre = lx_scale(lx_add(box.low, box.high), 0.5f), .axis = lx_normalize(sum), .half_angle = LX_PI};
+    float cosine = 1;
+    for (size_t i = 0; i < count; ++i) {
+        out->radius = lx_max(out->radius, lx_distance(out->centre, tile->sites[i].position));
+        cosine = lx_min(cosine, lx_dot(out->axis, tile->sites[i].geometric_normal));
+    }
+    out->radius *= 1.0001f;
+    if (lx_dot(sum, sum) > 0) out->half_angle = acosf(lx_clamp(cosine, -1, 1)) + 1e-3f;
+}
+
+// Angle by which directions to a ball differ from that to its centre; pi from within.
+static float spread_angle(float radius, float distance)
+{
+    return distance > radius ? asinf(radius / distance) + 1e-3f : LX_PI;
+}
+
+static float angle_between(lx_vec3 unit, lx_vec3 v, float length)
+{
+    return length > 0 ? acosf(lx_clamp(lx_dot(unit, v) / length, -1, 1)) : 0;
+}
+
+// False if the source certainly gives no site of the tile anything.
+static bool may_reach(const lx_tracer *tracer, uint32_t source, const lx_direct_bounds *bounds)
+{
+    const lx_source_sphere *s = &tracer->source_spheres[source];
+    const lx_source *described = lx_tracer_source(tracer, source);
+    const lx_light *light = described->light >= 0 ? &tracer->scene->lights[described->light] : NULL;
+    if (light && light->kind == LX_LIGHT_DIRECTIONAL)
+        return angle_between(bounds->axis, lx_neg(light->direction), 1) < bounds->half_angle + LX_PI / 2 + light->radius / 2;
+    if (!(s->power < INFINITY)) return true;
+    const lx_vec3 to_centre = lx_sub(s->centre, bounds->centre);
+    const float distance = lx_length(to_centre);
+    if (angle_between(bounds->axis, to_centre, distance) >
+        bounds->half_angle + LX_PI / 2 + spread_angle(bounds->radius + s->radius, distance))
+        return false;
+    if (!light) return true;
+    if (light->range > 0 && distance - bounds->radius >= light->range) return false;
+    const float facing = -lx_dot(light->direction, to_centre);
+    if (light->kind == LX_LIGHT_RECT || light->kind == LX_LIGHT_DISK) return facing + bounds->radius > 0;
+    if (light->kind != LX_LIGHT_SPOT) return true;
+    return angle_between(light->direction, lx_neg(to_centre), distance) < light->outer_angle + spread_angle(bounds->radius, distance);
+}
+
+// Sources whose light does not depend on the random numbers: their samples differ by site alone.
+static bool is_sharp(const lx_tracer *tracer, uint32_t source)
+{
+    const int32_t index = lx_tracer_source(tracer, source)->light;
+    if (index < 0) return false;
+    const lx_light *light = &tracer->scene->lights[index];
+    return light->kind != LX_LIGHT_RECT && light->kind != LX_LIGHT_DISK && light->radius == 0;
+}
+
+// ---- samples ------------------------------------------------------------------------------------------------------------------
+
+static bool take_sample(const job *j, uint32_t luxel, uint32_t i, lx_ray *ray, lx_rgb *light, uint32_t *cell)
+{
+    const lx_receiver *site = &j->tile->sites[(size_t)luxel * lx_direct_sites + 5 * i % lx_direct_sites];
+    if (lx_source_bound(j->tracer, j->source, site) == 0) return false;
+    j->b->luxels[luxel].possible = true;
+    const lx_vec2 u = lx_sobol_pair(i, lx_hash_combine(j->tile->stream[luxel], j->key));
+    return lx_sample_source(j->tracer, j->source, site, u, j->weight, ray, light, cell);
+}
+
+static void trace_rays(const job *j, size_t count)
+{
+    lx_trace_transmittance(j->tracer, j->b->rays, j->b->transmittance, count);
+    j->b->ray_count += count;
+}
+
+static void finish_looks(const job *j, size_t count)
+{
+    trace_rays(j, count);
+    for (size_t k = 0; k < count; ++k) j->b->looks[j->b->owner[k] / lx_direct_sites][j->b->owner[k] % lx_direct_sites].transmittance = j->b->transmittance[k];
+}
+
+static bool same_rgb(lx_rgb a, lx_rgb b)
+{
+    return a.r == b.r && a.g == b.g && a.b == b.b;
+}
+
+static void judge(lx_direct_batch *b, uint32_t luxel)
+{
+    luxel_state *s = &b->luxels[luxel];
+    s->verdict = sees_nothing;
+    s->light = s->squares = 0;
+    for (uint32_t i = 0; i < s->looked; ++i) {
+        const look *l = &b->looks[luxel][i];
+        if (!l->arrives) continue;
+        const float light = lx_rgb_max(l->light);
+        s->light += light;
+        s->squares += light * light;
+        if (s->verdict == sees_nothing) {
+            s->verdict = sees_same;
+            s->transmittance = l->transmittance;
+        } else if (!same_rgb(s->transmittance, l->transmittance)) {
+            s->verdict = sees_both;
+            return;
+        }
     }
 }
 
-// Sums of all samples of one luxel. False: nothing arrives.
-static bool sum_luxel(lx_direct_batch *b, const lx_direct_settings *settings, const lx_direct_tile *tile, uint32_t luxel, uint32_t source)
+// Takes the listed luxels' looks up to number `end` and judges them.
+static void look_at(const job *j, const uint16_t *list, uint32_t list_count, uint32_t end)
 {
-    const lx_tracer *tracer = settings->tracer;
-    const uint32_t weight = lx_direct_sample_weight(tracer, source), samples = settings->samples * weight;
-    // As the path integrator's light samples at the start of a path: vertex 0.
-    const uint32_t key = lx_hash_combine(tile->stream[luxel], lx_hash_combine(tracer->source_keys[source], 0));
-    const lx_receiver *sites = tile->sites + (size_t)luxel * lx_direct_sites;
+    lx_direct_batch *b = j->b;
     size_t count = 0;
-    bool arrives = false;
-    for (uint32_t i = 0; i < samples; ++i) {
-        const lx_receiver *site = &sites[5 * i % lx_direct_sites];
-        if (lx_source_bound(tracer, source, site) == 0) continue;
-        if (!lx_sample_source(tracer, source, site, lx_sobol_pair(i, key), weight, &b->rays[count], &b->light[count], &b->cell[count])) continue;
-        b->run[count] = (uint8_t)((uint64_t)i * runs / samples);
-        arrives = true;
-        if (++count < ray_batch) continue;
-        flush(b, tracer, count);
-        count = 0;
+    for (uint32_t k = 0; k < list_count; ++k) {
+        luxel_state *s = &b->luxels[list[k]];
+        for (uint32_t i = s->looked; i < end; ++i) {
+            look *l = &b->looks[list[k]][i];
+            l->arrives = take_sample(j, list[k], i, &b->rays[count], &l->light, &l->cell);
+            if (!l->arrives) continue;
+            b->owner[count++] = (uint32_t)list[k] * lx_direct_sites + i;
+            if (count < ray_batch) continue;
+            finish_looks(j, count);
+            count = 0;
+        }
+        s->looked = (uint8_t)end;
     }
-    flush(b, tracer, count);
-    return arrives;
+    finish_looks(j, count);
+    for (uint32_t k = 0; k < list_count; ++k) judge(b, list[k]);
+}
+
+// ---- outlines of shadows -------------------------------------------------------------------------------------------------------
+
+static void place_on_grid(lx_direct_batch *b, const lx_direct_tile *tile)
+{
+    memset(b->grid, 0, sizeof b->grid);
+    for (uint32_t i = 0; i < tile->count; ++i)
+        b->grid[(tile->place[i] / tile_edge + 1) * grid_edge + tile->place[i] % tile_edge + 1] = (uint16_t)(i + 1);
+}
+
+// Up to 8 luxels of the same chart around one.
+static uint32_t find_neighbours(const job *j, uint32_t luxel, uint16_t out[8])
+{
+    const uint16_t *centre = &j->b->grid[(j->tile->place[luxel] / tile_edge + 1) * grid_edge + j->tile->place[luxel] % tile_edge + 1];
+    uint32_t count = 0;
+    for (int y = -1; y <= 1; ++y)
+        for (int x = -1; x <= 1; ++x) {
+            const uint16_t other = centre[y * grid_edge + x];
+            if (other && other - 1u != luxel && j->tile->chart[other - 1] == j->tile->chart[luxel]) out[count++] = (uint16_t)(other - 1);
+        }
+    return count;
+}
+
+// Does what `b` sees cast doubt on what few rays of `a` tell?
+static bool differ(const luxel_state *a, const luxel_state *b)
+{
+    return b->verdict == sees_both || (a->verdict == sees_same && b->verdict == sees_same && !same_rgb(a->transmittance, b->transmittance));
+}
+
+// Looks of a luxel and its neighbours, counted by weight: (sum of w)² / sum of w², Kish's effective sample size.
+static float count_looks(const job *j, uint32_t luxel, const uint16_t *around, uint32_t count)
+{
+    const luxel_state *luxels = j->b->luxels;
+    float light = luxels[luxel].light, squares = luxels[luxel].squares;
+    for (uint32_t k = 0; k < count; ++k) {
+        light += luxels[around[k]].light;
+        squares += luxels[around[k]].squares;
+    }
+    return squares > 0 ? light * light / squares : 0;
+}
+
+static void look_where_it_matters(const job *j)
+{
+    lx_direct_batch *b = j->b;
+    uint16_t around[8];
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < j->tile->count; ++i) b->list[count++] = (uint16_t)i;
+    look_at(j, b->list, count, probes);
+    count = 0;
+    for (uint32_t i = 0; i < j->tile->count; ++i) {
+        luxel_state *s = &b->luxels[i];
+        const uint32_t n = find_neighbours(j, i, around);
+        s->listed = s->verdict != sees_same || count_looks(j, i, around, n) < enough_looks;
+        for (uint32_t k = 0; k < n && !s->listed; ++k) s->listed = differ(s, &b->luxels[around[k]]);
+        if (s->listed) b->list[count++] = (uint16_t)i;
+    }
+    while (count > 0) {
+        look_at(j, b->list, count, lx_direct_sites);
+        uint32_t next = 0;
+        for (uint32_t i = 0; i < count; ++i) {
+            const uint32_t n = find_neighbours(j, b->list[i], around);
+            for (uint32_t k = 0; k < n; ++k) {
+                luxel_state *s = &b->luxels[around[k]];
+                if (s->listed || !differ(s, &b->luxels[b->list[i]])) continue;
+                s->listed = true;
+                b->next[next++] = around[k];
+            }
+        }
+        memcpy(b->list, b->next, next * sizeof *b->list);
+        count = next;
+    }
+    for (uint32_t i = 0; i < j->tile->count; ++i) {
+        luxel_state *s = &b->luxels[i];
+        if (!s->listed || s->verdict != sees_same) continue;
+        s->doubtful = count_looks(j, i, around, 0) < enough_own_looks || count_looks(j, i, around, find_neighbours(j, i, around)) < enough_looks;
+    }
+}
+
+// ---- sums -----------------------------------------------------------------------------------------------------------------------
+
+static void add_to(lx_direct_batch *b, uint32_t sum, uint32_t run, lx_rgb arrives)
+{
+    b->sums[sum] = lx_rgb_add(b->sums[sum], arrives);
+    b->run_sums[sum][run] += (arrives.r + arrives.g + arrives.b) * (1.0f / 3);
 }
 
 static float variance_of_mean(const float sums[runs], float scale)
@@ -107,27 +341,123 @@ static float variance_of_mean(const float sums[runs], float scale)
     return squares * scale * scale / (runs * (runs - 1));
 }
 
+static void store(const job *j, uint32_t luxel, uint32_t slot, uint32_t samples, lx_rgb factor, lx_rgb *mean, float *variance)
+{
+    const float grey = (factor.r + factor.g + factor.b) * (1.0f / 3);
+    for (uint32_t cell = 0; cell < j->cells; ++cell) {
+        const size_t at = (size_t)cell * j->tile->count + luxel;
+        mean[at] = lx_rgb_mul(lx_rgb_scale(j->b->sums[slot * j->cells + cell], 1 / (float)samples), factor);
+        variance[at] = grey * grey * variance_of_mean(j->b->run_sums[slot * j->cells + cell], runs / (float)samples);
+    }
+}
+
+static void clear_sums(const job *j, uint32_t slots)
+{
+    memset(j->b->sums, 0, slots * j->cells * sizeof *j->b->sums);
+    memset(j->b->run_sums, 0, slots * j->cells * sizeof *j->b->run_sums);
+}
+
+// Adds samples first … end of a luxel without asking what is in their way. Those that were looked at are remembered.
+static void add_unshadowed(const job *j, uint32_t luxel, uint32_t first, uint32_t end, uint32_t samples)
+{
+    lx_direct_batch *b = j->b;
+    for (uint32_t i = first; i < end; ++i) {
+        lx_ray ray;
+        look fresh;
+        const look *l = &fresh;
+        if (i < b->luxels[luxel].looked)
+            l = &b->looks[luxel][i];
+        else
+            fresh.arrives = take_sample(j, luxel, i, &ray, &fresh.light, &fresh.cell);
+        if (l->arrives) add_to(b, l->cell, i * runs / samples, l->light);
+    }
+}
+
+static void sum_evenly_lit(const job *j, uint32_t luxel, lx_rgb *mean, float *variance)
+{
+    clear_sums(j, 1);
+    uint32_t samples = j->samples;
+    if (j->cells == 1 && samples > lx_direct_sites) {
+        samples = lx_direct_sites;
+        add_unshadowed(j, luxel, 0, samples, samples);
+        const lx_rgb sum = j->b->sums[0];
+        const float all = (sum.r + sum.g + sum.b) * (1.0f / 3) / (float)samples;
+        if (variance_of_mean(j->b->run_sums[0], runs / (float)samples) > fine_deviation * fine_deviation * all * all) {
+            clear_sums(j, 1);
+            samples = j->samples;
+            add_unshadowed(j, luxel, 0, samples, samples);
+        }
+    } else {
+        add_unshadowed(j, luxel, 0, samples, samples);
+    }
+    store(j, luxel, 0, samples, j->b->luxels[luxel].transmittance, mean, variance);
+}
+
+static void finish_sums(const job *j, size_t count)
+{
+    trace_rays(j, count);
+    for (size_t k = 0; k < count; ++k)
+        add_to(j->b, j->b->owner[k], j->b->run[k], lx_rgb_mul(j->b->light[k], j->b->transmittance[k]));
+}
+
+// All rays of the listed luxels: those looked at already, and the others.
+static void sum_shadowed(const job *j, const uint16_t *list, uint32_t list_count, lx_rgb *mean, float *variance)
+{
+    lx_direct_batch *b = j->b;
+    size_t count = 0;
+    clear_sums(j, list_count);
+    for (uint32_t slot = 0; slot < list_count; ++slot) {
+        const uint32_t luxel = list[slot];
+        for (uint32_t i = 0; i < b->luxels[luxel].looked; ++i) {
+            const look *l = &b->looks[luxel][i];
+            if (l->arrives) add_to(b, slot * j->cells + l->cell, i * runs / j->samples, lx_rgb_mul(l->light, l->transmittance));
+        }
+        for (uint32_t i = b->luxels[luxel].looked; i < j->samples; ++i) {
+            uint32_t cell;
+            if (!take_sample(j, luxel, i, &b->rays[count], &b->light[count], &cell)) continue;
+            b->owner[count] = slot * j->cells + cell;
+            b->run[count] = (uint8_t)(i * runs / j->samples);
+            if (++count < ray_batch) continue;
+            finish_sums(j, count);
+            count = 0;
+        }
+    }
+    finish_sums(j, count);
+    for (uint32_t slot = 0; slot < list_count; ++slot) store(j, list[slot], slot, j->samples, (lx_rgb){1, 1, 1}, mean, variance);
+}
+
 bool lx_direct_light(lx_direct_batch *b, const lx_direct_settings *settings, const lx_direct_tile *tile, uint32_t source, lx_rgb *mean,
                      float *variance)
 {
-    const uint32_t cells = lx_tracer_cell_count(settings->tracer, source);
-    const uint32_t samples = settings->samples * lx_direct_sample_weight(settings->tracer, source);
-    bool any = false;
-    for (uint32_t luxel = 0; luxel < tile->count; ++luxel) {
-        memset(b->sums, 0, cells * sizeof *b->sums);
-        memset(b->run_sums, 0, cells * sizeof *b->run_sums);
-        const bool arrives = sum_luxel(b, settings, tile, luxel, source);
-        if (!arrives && !any) continue;
-        for (uint32_t cell = 0; cell < cells; ++cell) {
-            const size_t at = (size_t)cell * tile->count;
-            for (uint32_t i = any ? luxel : 0; i <= luxel; ++i) {
-                mean[at + i] = (lx_rgb){0, 0, 0};
-                variance[at + i] = 0;
-            }
-            mean[at + luxel] = lx_rgb_scale(b->sums[cell], 1 / (float)samples);
-            variance[at + luxel] = variance_of_mean(b->run_sums[cell], runs / (float)samples);
-        }
-        any = true;
+    const lx_tracer *tracer = settings->tracer;
+    if (tile->bounds && !may_reach(tracer, source, tile->bounds)) return false;
+    // Random numbers as the path integrator takes them for the light samples at the start of a path: vertex 0.
+    job j = {.b = b, .tracer = tracer, .tile = tile, .source = source, .key = lx_hash_combine(tracer->source_keys[source], 0),
+             .cells = lx_tracer_cell_count(tracer, source), .weight = lx_direct_sample_weight(tracer, source)};
+    j.samples = is_sharp(tracer, source) ? (uint32_t)lx_direct_sites : settings->samples * j.weight;
+    memset(b->luxels, 0, tile->count * sizeof *b->luxels);
+    if (!settings->all_rays) {
+        place_on_grid(b, tile);
+        look_where_it_matters(&j);
     }
-    return any;
+    const size_t zeros = (size_t)j.cells * tile->count;
+    memset(mean, 0, zeros * sizeof *mean);
+    memset(variance, 0, zeros * sizeof *variance);
+    const uint32_t chunk = j.cells == 1 ? (uint32_t)chunk_luxels : 1;
+    uint32_t count = 0;
+    bool any = false;
+    for (uint32_t i = 0; i < tile->count; ++i) {
+        const luxel_state *s = &b->luxels[i];
+        if (s->verdict == sees_same && !s->doubtful) {
+            if (lx_rgb_is_black(s->transmittance)) continue;
+            sum_evenly_lit(&j, i, mean, variance);
+            any = true;
+            continue;
+        }
+        if (!s->possible && s->looked == lx_direct_sites) continue; // behind every site's horizon
+        b->list[count++] = (uint16_t)i;
+    }
+    for (uint32_t first = 0; first < count; first += chunk)
+        sum_shadowed(&j, b->list + first, count - first < chunk ? count - first : chunk, mean, variance);
+    return any || count > 0;
 }

@@ -10,6 +10,14 @@
 
 enum { lx_direct_sites = 16 }; ///< Receivers per luxel.
 
+/// A sphere around all sites of a tile and a cone around their geometric normals: what no source behind its horizon, out of range or
+/// turned away can reach.
+typedef struct lx_direct_bounds {
+    lx_vec3 centre, axis;
+    float radius;
+    float half_angle; ///< Radians; pi: any direction.
+} lx_direct_bounds;
+
 /// The luxels of one tile.
 typedef struct lx_direct_tile {
     uint32_t count;             ///< At most 32 × 32.
@@ -17,11 +25,15 @@ typedef struct lx_direct_tile {
     const uint32_t *chart;      ///< [count] only luxels of one chart are neighbours.
     const uint32_t *stream;     ///< [count] key of the luxel's random numbers.
     const lx_receiver *sites;   ///< [count][lx_direct_sites]
+    const lx_direct_bounds *bounds; ///< Of the sites, once for all sources; NULL: no source is left out at once.
 } lx_direct_tile;
+
+void lx_direct_find_bounds(const lx_direct_tile *tile, lx_direct_bounds *out);
 
 typedef struct lx_direct_settings {
     const lx_tracer *tracer;
-    uint32_t samples;           ///< At most so many shadow rays a luxel and source (times the cells' share for monitors), a multiple of lx_direct_sites.
+    uint32_t samples;           ///< At most so many shadow rays a luxel and source (times lx_direct_sample_weight), a multiple of lx_direct_sites.
+    bool all_rays;              ///< Every sample gets its ray: the referee of what is spared otherwise.
 } lx_direct_settings;
 
 /// Working memory of one worker.
@@ -33,7 +45,7 @@ uint64_t lx_direct_batch_rays(const lx_direct_batch *batch);
 /// Irradiance of source `source` at unit strength: mean over the sites, with the variance of that mean. The share of emissive surfaces and
 /// pictures of skies that cosine-weighted rays find better is left out: samples are weighed as `lx_sample_source(count = lx_direct_sample_weight)` says, hits have
 /// lx_hit_weight with the same count. `mean`: [cell][luxel of the tile] rgb; `variance`: [cell][luxel], of the mean of the channels.
-/// False: nothing arrives anywhere in the tile, nothing was written.
+/// False: nothing arrives anywhere in the tile; what `mean` and `variance` hold is undefined.
 bool lx_direct_light(lx_direct_batch *batch, const lx_direct_settings *settings, const lx_direct_tile *tile, uint32_t source, lx_rgb *mean,
                      float *variance);
 

@@ -155,7 +155,6 @@ static lx_result build_surfaces(lx_tracer *tracer, bool include_dynamic, lx_erro
         lx_traced_surface *out = &tracer->surfaces[i];
         out->kind = classify(scene, s);
         out->orientation = lx_mat4_determinant3(instance->transform) < 0 ? -1.0f : 1.0f;
-        tracer->any_mirrored |= out->orientation < 0;
         if (!instance->is_static && !include_dynamic) continue;
         out->positions = next;
         for (uint32_t v = 0; v < primitive->vertex_count; ++v)
@@ -174,6 +173,7 @@ static lx_result build_accel(lx_tracer *tracer, lx_error *error)
         if (!tracer->surfaces[i].positions) continue;
         meshes[i] = (lx_accel_mesh){.vertices = tracer->surfaces[i].positions, .indices = primitive->indices,
                                     .vertex_count = primitive->vertex_count, .triangle_count = primitive->triangle_count,
+                                    .mirrored = tracer->surfaces[i].orientation < 0,
                                     .has_holes = tracer->surfaces[i].kind == LX_SURFACE_CUTOUT,
                                     .transmits = tracer->surfaces[i].kind == LX_SURFACE_TRANSLUCENT,
                                     .front = lx_surface_is_solid(tracer, i) ? tracer->surfaces[i].orientation : 0};
@@ -400,9 +400,6 @@ const char *lx_tracer_isa(const lx_tracer *tracer)
 void lx_trace_closest(const lx_tracer *tracer, const lx_ray *rays, lx_hit *hits, size_t count)
 {
     lx_accel_closest(tracer->accel, rays, hits, count);
-    if (!tracer->any_mirrored) return;
-    for (size_t i = 0; i < count; ++i)
-        if (hits[i].surface != LX_MISS && tracer->surfaces[hits[i].surface].orientation < 0) hits[i].back = !hits[i].back;
 }
 
 void lx_trace_transmittance(const lx_tracer *tracer, const lx_ray *rays, lx_rgb *transmittance, size_t count)

@@ -32,7 +32,6 @@ struct lx_tracer {
     const lx_scene *scene;
     bool coloured_shadows;
     lx_traced_surface *surfaces; ///< Parallel to the scene's.
-    bool any_mirrored;           ///< Some surface has orientation -1.
     lx_vec3 *positions;          ///< World positions of all traced surfaces, with room behind the last one.
     lx_accel *accel;
     lx_emitters emitters;

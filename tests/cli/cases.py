@@ -91,7 +91,24 @@ MISTAKES = {
     "scene_twice": ("bake room.glb other.glb -o out", ["other.glb"]),
     "direct_and_indirect": ("bake room.glb -o out --direct-only --indirect-only", ["--direct-only", "--indirect-only"]),
     "indirect_without_bounces": ("bake room.glb -o out --indirect-only --bounces 0", ["no light"]),
-    "integrator_unknown": ("bake room.glb -o out --integrator magic", ["magic", "path"]),
+    "integrator_unknown": ("bake room.glb -o out --integrator magic", ["magic", "gather|path"]),
+    "denoiser_unknown": ("bake room.glb -o out --denoise magic", ["magic", "none|builtin|oidn"]),
+    "noise_for_paths": ("bake room.glb -o out --integrator path --noise 0", ["--noise", "--integrator gather"]),
+    "time_for_paths": ("bake room.glb -o out --integrator path --time 5m", ["--time", "--integrator gather"]),
+    "memory_for_paths": ("bake room.glb -o out --integrator path --memory 2G", ["--memory", "--integrator gather"]),
+    "denoise_for_paths": ("bake room.glb -o out --integrator path --denoise none", ["--denoise", "--integrator gather"]),
+    "noise_too_large": ("bake room.glb -o out --noise 2", ["--noise", "2 is above 1"]),
+    "noise_negative": ("bake room.glb -o out --noise -0.1", ["--noise", "below 0"]),
+    "time_in_days": ("bake room.glb -o out --time 2d", ["--time", "'2d' is no duration"]),
+    "time_in_wrong_order": ("bake room.glb -o out --time 5m1h", ["--time", "'5m1h' is no duration"]),
+    "time_without_last_unit": ("bake room.glb -o out --time 1h30", ["--time", "'1h30' is no duration"]),
+    "time_none": ("bake room.glb -o out --time 0s", ["--time", "'0s' is no duration"]),
+    "time_infinite": ("bake room.glb -o out --time inf", ["--time", "'inf' is no duration"]),
+    "memory_in_words": ("bake room.glb -o out --memory much", ["--memory", "'much' is no size"]),
+    "memory_unit_unknown": ("bake room.glb -o out --memory 2Gb", ["--memory", "'2Gb' is no size"]),
+    "memory_none": ("bake room.glb -o out --memory 0", ["--memory", "'0' is no size"]),
+    "memory_beyond_all_machines": ("bake room.glb -o out --memory 99999999T", ["--memory", "too large"]),
+    "bounces_too_many": ("bake room.glb -o out --bounces 4294967294", ["--bounces", "above 1000000"]),
     "isa_unknown": ("bake room.glb -o out --isa mmx", ["mmx", "avx2"]),
     "sky_neither_colour_nor_file": ("bake room.glb -o out --sky blue", ["blue", "#rrggbb"]),
     "sky_negative": ("bake room.glb -o out --sky 1,-1,0", ["1,-1,0"]),
@@ -254,9 +271,9 @@ def mean(path):
 @case
 def bake_prints_a_summary():
     write("room.glb", scenes.GOOD)
-    luxel("bake", "room.glb", "-o", "room.baked", "--page-size", "64", "--samples", "4",
+    luxel("bake", "room.glb", "-o", "room.baked", "--page-size", "64", "--samples", "4", "--bounces", "8",
           out="room.baked\n*1 page of 64 x 64, *%*covered*texels/m\n*3 layers from 3 sources, 4 samples, 8 bounces\n"
-              "*rays/s*\n*luxel.pack*\n*preview.png*")
+              "*quality*\n*rays/s\n*MiB of memory at most*\n*luxel.pack*\n*preview.png*")
     for name in ("scene.glb", "luxel.json", "luxel.pack", "preview.png"):
         expect(os.path.getsize("room.baked/" + name) > 0, "no " + name)
     expect(read("room.baked/preview.png")[:4] == b"\x89PNG", "preview.png is no PNG")
@@ -271,6 +288,22 @@ def bake_json_summary():
     expect(summary["layers"] == 3 and summary["samples"] == 4 and summary["bounces"] == "inf", result.out)
     expect(0 < summary["coverage"] <= 1 and summary["rays"] > 0 and summary["preview"] is None, result.out)
     expect(summary["pack_bytes"] == os.path.getsize("room.baked/luxel.pack"), result.out)
+
+
+@case
+def bake_says_how_it_was_baked():
+    write("room.glb", scenes.GOOD)
+    for options, integrator, denoise in (((), "gather", "builtin"), (("--denoise", "none"), "gather", "none"), (None, "path", "none")):
+        limits = ("--time", "1h30m", "--memory", "1.5GiB", "--noise", "0.5") if options is not None else ()
+        result = luxel("bake", "room.glb", "-o", "room.baked", *FAST, "--no-preview", "--json", "--integrator", integrator, *(options or ()), *limits)
+        summary, manifest = json.loads(result.out), json.loads(read("room.baked/luxel.json"))["bake"]
+        expect(summary["integrator"] == manifest["integrator"] == integrator, result.out)
+        expect(summary["denoise"] == manifest["denoise"] == denoise, result.out)
+        expect(summary["bounces"] == (8 if integrator == "path" else "inf"), result.out)
+        expect(summary["groups"] == 1, result.out)
+        expect((summary["noise"] is None) == (integrator == "path") == ("noise" not in manifest), result.out)
+        page = read("room.baked/report.html").decode()
+        expect(("noise, estimated" in page) == (integrator == "gather") and "<td>%s</td>" % integrator in page, "the report does not say it")
 
 
 @case

@@ -3,6 +3,7 @@
 #define BAKE_FIXTURE_H
 
 #include "bake/bake.h"
+#include "bake/luxel_map.h"
 #include "scene/gltf.h"
 
 #include <stdlib.h>
@@ -67,24 +68,45 @@ static inline float fixture_texel(uint32_t page, uint32_t layer, uint32_t chart,
     return brightness[layer % 8] * (float)(1 + chart + page) * (1 + 0.01f * (float)x) * (1 + 0.003f * (float)y) / (float)(1 + channel);
 }
 
-// Charts are columns of 16 texels with a gap of 4; what is left of the middle of a gap belongs to the chart at its left.
-static void fixture_fill(lx_bake *bake)
+// Charts are columns of 16 texels with a gap of 4; what is left of the middle of a gap belongs to the chart at its left, as texels with a colour of
+// their own.
+static lx_result fixture_fill(lx_bake *bake, lx_error *error)
 {
-    const uint32_t size = bake->atlas->page_size;
-    for (uint32_t page = 0; page < bake->atlas->page_count; ++page) {
-        for (uint32_t y = 0; y < size; ++y) {
-            for (uint32_t x = 0; x < size; ++x) {
-                const size_t texel = (size_t)y * size + x, i = (size_t)page * size * size + texel;
-                const uint32_t chart = y < size - 8 ? (x + 2) / 20 : LX_NO_CHART;
-                bake->texel_chart[i] = chart;
-                bake->texel_coverage[i] = chart == LX_NO_CHART || (x + 2) % 20 < 2 || (x + 2) % 20 >= 18 ? 0 : 255;
-                for (uint32_t layer = 0; layer < bake->layer_count; ++layer)
-                    for (int k = 0; k < 3; ++k)
-                        lx_bake_image(bake, page, layer)[3 * texel + (size_t)k] =
-                            chart == LX_NO_CHART ? 0 : fixture_texel(page, layer, chart, x, y, k);
-            }
-        }
+    const uint32_t size = bake->atlas->page_size, page_texels = size * size, texel_count = bake->atlas->page_count * page_texels;
+    uint32_t *extras = malloc(texel_count * sizeof *extras), extra_count = 0;
+    for (uint32_t i = 0; i < texel_count; ++i) {
+        const uint32_t x = i % size, y = i / size % size, chart = y < size - 8 ? (x + 2) / 20 : LX_NO_CHART;
+        bake->texel_chart[i] = chart;
+        bake->texel_coverage[i] = chart == LX_NO_CHART || (x + 2) % 20 < 2 || (x + 2) % 20 >= 18 ? 0 : 255;
+        if (chart != LX_NO_CHART && !bake->texel_coverage[i]) extras[extra_count++] = i;
     }
+    lx_bake_map map = {0};
+    lx_finished_destroy(bake->finished);
+    bake->finished = NULL;
+    lx_result result = lx_bake_map_build(size, bake->atlas->page_count, bake->texel_chart, bake->texel_coverage, &map, error);
+    if (result == LX_OK) result = lx_finished_create(&map.view, bake->layer_count, false, NULL, &bake->finished, error);
+    for (uint32_t page = 0; page < bake->atlas->page_count && result == LX_OK; ++page)
+        result = lx_finished_dilate(bake->finished, &map.view, page, 0, bake->texel_chart + page * page_texels, error);
+    if (result == LX_OK) result = lx_finished_extend(bake->finished, extras, extra_count, error);
+    for (uint32_t layer = 0; layer < bake->layer_count && result == LX_OK; ++layer)
+        for (uint32_t entry = 0; entry < lx_finished_count(bake->finished) && result == LX_OK; ++entry) {
+            const uint32_t i = entry < map.view.count ? map.texel[entry] : extras[entry - map.view.count];
+            const uint32_t page = i / page_texels, x = i % size, y = i / size % size, chart = bake->texel_chart[i];
+            const lx_rgb rgb = {fixture_texel(page, layer, chart, x, y, 0), fixture_texel(page, layer, chart, x, y, 1),
+                                fixture_texel(page, layer, chart, x, y, 2)};
+            result = lx_finished_write(bake->finished, layer, entry, 1, &rgb, error);
+        }
+    lx_bake_map_release(&map);
+    free(extras);
+    return result;
+}
+
+// Of one page and layer, owned by the caller.
+static inline float *fixture_image(const lx_bake *bake, uint32_t page, uint32_t layer)
+{
+    float *image = malloc((size_t)bake->atlas->page_size * bake->atlas->page_size * 3 * sizeof *image);
+    if (lx_finished_image(bake->finished, page, layer, image, NULL) != LX_OK) abort();
+    return image;
 }
 
 static lx_result fixture_create(bake_fixture *out, const lx_bake_desc *desc, lx_error *error)
@@ -101,7 +123,7 @@ static lx_result fixture_create(bake_fixture *out, const lx_bake_desc *desc, lx_
     if (result == LX_OK) result = lx_gltf_import(out->context, "room.glb", NULL, glb, bytes, &load_desc, &out->scene, error);
     if (result == LX_OK) result = lx_atlas_build(out->scene, &atlas_desc, NULL, &out->atlas, error);
     if (result == LX_OK) result = lx_bake_create(out->scene, out->atlas, desc, &out->bake, error);
-    if (result == LX_OK) fixture_fill(out->bake);
+    if (result == LX_OK) result = fixture_fill(out->bake, error);
     return result;
 }
 

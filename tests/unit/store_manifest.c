@@ -36,7 +36,7 @@ static void fill(lx_manifest *manifest)
         .has_view = true,
         .sky = {"sky.exr", {1, 0.5f, 0.25f}, 45, 3},
         .view_ev = -3.1415927f,
-        .bake = {256, LX_BOUNCES_INF, "path", 7, "avx2", 12.5, {0.5, 1, 0.25, 9, 0.125, 2, 3}, 8},
+        .bake = {256, LX_BOUNCES_INF, "gather", "builtin", 0.0175f, 7, "avx2", 12.5, {0.5, 1, 0.25, 9, 0.125, 2, 3, 4, 0, 3.5, 0.75}, 8},
         .scene_hash = 0x0123456789abcdef,
         .pack_hash = 0xfedcba9876543210,
     };
@@ -106,6 +106,10 @@ static void manifest_round_trip_keeps_every_bit(void **state)
     assert_float_equal(back.sky.rotation_deg, 45, 0);
     assert_memory_equal(&back.view_ev, &manifest.view_ev, 4);
     assert_int_equal(back.bake.bounces, LX_BOUNCES_INF);
+    assert_string_equal(back.bake.integrator, "gather");
+    assert_string_equal(back.bake.denoise, "builtin");
+    assert_memory_equal(&back.bake.noise, &manifest.bake.noise, 4);
+    assert_null(strstr(text, "\"cache\"")); // a part of the bake that there was not
     assert_int_equal(back.bake.seed, 7);
     assert_string_equal(back.bake.isa, "avx2");
     assert_true(back.scene_hash == manifest.scene_hash && back.pack_hash == manifest.pack_hash);

@@ -1,0 +1,249 @@
+// Direct light of a tile against brute force: every kind of source, half of the tile under a shade.
+#include "trace/direct.h"
+#include "trace/tracer_data.h"
+#include "math/hash.h"
+#include "unit/scene_fixture.h"
+
+enum { edge = 6, luxels = edge * edge, samples = 64, brute_samples = 16 * 400, most_cells = 6 };
+
+// Two squares, one of them with texture coordinates (a monitor needs them); a lamp of every kind above or beside the tile.
+static const char members[] =
+    "'bufferViews':[{'buffer':0,'byteLength':48},{'buffer':0,'byteOffset':48,'byteLength':32},{'buffer':0,'byteOffset':80,'byteLength':12}],"
+    "'accessors':[{'bufferView':0,'componentType':5126,'count':4,'type':'VEC3'},{'bufferView':1,'componentType':5126,'count':4,'type':'VEC2'},"
+    "{'bufferView':2,'componentType':5123,'count':6,'type':'SCALAR'}],"
+    "'meshes':[{'primitives':[{'attributes':{'POSITION':0},'indices':2,'material':0}]},"
+    "{'primitives':[{'attributes':{'POSITION':0,'TEXCOORD_0':1},'indices':2,'material':1}]},"
+    "{'primitives':[{'attributes':{'POSITION':0,'TEXCOORD_0':1},'indices':2,'material':2}]},"
+    "{'primitives':[{'attributes':{'POSITION':0},'indices':2,'material':3}]}],"
+    "'materials':[{'doubleSided':true},{'emissiveFactor':[1,1,1]},{'emissiveFactor':[1,1,1],'extras':{'luxel_monitor':'3x2'}},"
+    "{'alphaMode':'BLEND','doubleSided':true,'pbrMetallicRoughness':{'baseColorFactor':[1,1,1,0.25]}}],"
+    "'extensionsUsed':['KHR_lights_punctual'],'extensions':{'KHR_lights_punctual':{'lights':[{'type':'point'},{'type':'directional'}]}},"
+    "'nodes':[{'name':'shade','mesh':0,'rotation':[0.70710678,0,0,0.70710678],'translation':[1,1,-1.5],'scale':[1,1.5,1]},"
+    "{'name':'veil','mesh':3,'rotation':[0.70710678,0,0,0.70710678],'translation':[1,1.2,1.5],'scale':[1,1.5,1]},"
+    "{'name':'bulb','extensions':{'KHR_lights_punctual':{'light':0}},'translation':[-0.4,2,0]},"
+    "{'name':'globe','extensions':{'KHR_lights_punctual':{'light':0}},'translation':[0.3,2,0],'extras':{'luxel_radius':0.3}},"
+    "{'name':'sun','extensions':{'KHR_lights_punctual':{'light':1}},'rotation':[-0.65,0.1,0,0.75]},"
+    "{'name':'panel','translation':[0,2,0],'rotation':[-0.70710678,0,0,0.70710678],'extras':{'luxel_area':'rect 1 0.5'}},"
+    "{'name':'dish','translation':[0,1.5,0],'rotation':[-0.70710678,0,0,0.70710678],'extras':{'luxel_area':'disk 0.4'}},"
+    "{'name':'glow','mesh':1,'rotation':[0.70710678,0,0,0.70710678],'translation':[0,2.5,0],'scale':[0.5,0.25,1]},"
+    "{'name':'screen','mesh':2,'rotation':[0,0.70710678,0,0.70710678],'translation':[-2,1,0]},"
+    "{'name':'below','translation':[0,-1,0],'extensions':{'KHR_lights_punctual':{'light':0}}}]";
+
+typedef struct fixture {
+    lx_scene *scene;
+    lx_tracer *tracer;
+    lx_direct_batch *batch;
+    lx_receiver sites[luxels * lx_direct_sites];
+    uint16_t place[luxels];
+    uint32_t chart[luxels], stream[luxels];
+    lx_direct_tile tile;
+} fixture;
+
+static void begin(fixture *f, uint32_t seed)
+{
+    bin_clear();
+    BIN_FLOATS(-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0);
+    BIN_FLOATS(0, 1, 1, 1, 1, 0, 0, 0);
+    BIN_U16(0, 1, 2, 0, 2, 3);
+    *f = (fixture){.scene = import_members(members)};
+    bool *cells = calloc(f->scene->source_count, sizeof *cells);
+    for (uint32_t i = 0; i < f->scene->source_count; ++i) cells[i] = f->scene->sources[i].columns > 0;
+    const lx_transport_desc transport = {.bounces = 0, .seed = 1};
+    assert_int_equal(lx_tracer_create(f->scene, &transport, false, cells, &f->tracer, NULL), LX_OK);
+    free(cells);
+    f->batch = lx_direct_batch_create(f->tracer);
+    assert_non_null(f->batch);
+    for (uint32_t i = 0; i < luxels; ++i) {
+        f->place[i] = (uint16_t)(i / edge * 32 + i % edge);
+        f->stream[i] = lx_hash_combine(seed, i);
+        for (uint32_t s = 0; s < lx_direct_sites; ++s) { // 4 × 4 in luxels of 0.4 m
+            const float x = ((float)(i % edge) + ((float)(s % 4) + 0.5f) / 4) * 0.4f - 1.2f;
+            const float z = ((float)(i / edge) + ((float)(s / 4) + 0.5f) / 4) * 0.4f - 1.2f;
+            f->sites[i * lx_direct_sites + s] = (lx_receiver){.position = {x, 0, z}, .normal = {0, 1, 0}, .geometric_normal = {0, 1, 0}};
+        }
+    }
+    f->tile = (lx_direct_tile){.count = luxels, .place = f->place, .chart = f->chart, .stream = f->stream, .sites = f->sites};
+}
+
+static void end(fixture *f)
+{
+    lx_direct_batch_destroy(f->batch);
+    lx_tracer_destroy(f->tracer);
+    lx_scene_destroy(f->scene);
+}
+
+static uint32_t source_number(const fixture *f, const char *name)
+{
+    return (uint32_t)(source_named(f->scene, name) - f->scene->sources);
+}
+
+// Independent samples of one luxel: mean and variance of one sample, per cell.
+static void brute_force(const fixture *f, uint32_t source, uint32_t luxel, double mean[most_cells], double variance[most_cells])
+{
+    double sum[most_cells] = {0}, squares[most_cells] = {0};
+    const uint32_t count = lx_direct_sample_weight(f->tracer, source);
+    for (uint32_t i = 0; i < brute_samples; ++i) {
+        const uint32_t bits = lx_hash_combine(0xb1a5, luxel * brute_samples + i);
+        const lx_vec2 u = {lx_unit_float(bits), lx_unit_float(lx_hash32(bits + 77))};
+        lx_ray ray;
+        lx_rgb light, transmittance;
+        uint32_t cell;
+        if (!lx_sample_source(f->tracer, source, &f->sites[luxel * lx_direct_sites + i % lx_direct_sites], u, count, &ray, &light, &cell)) continue;
+        lx_trace_transmittance(f->tracer, &ray, &transmittance, 1);
+        const double value = (double)(light.g * transmittance.g);
+        sum[cell] += value;
+        squares[cell] += value * value;
+    }
+    for (int c = 0; c < most_cells; ++c) {
+        mean[c] = sum[c] / brute_samples;
+        variance[c] = fmax(0, squares[c] / brute_samples - mean[c] * mean[c]);
+    }
+}
+
+// Well-spread samples vary less than independent ones, so the latter's variance bounds both sides; 5 standard deviations.
+static void check_source(const char *name)
+{
+    fixture f;
+    begin(&f, 1);
+    const uint32_t source = source_number(&f, name), cells = lx_tracer_cell_count(f.tracer, source);
+    lx_rgb mean[most_cells * luxels];
+    float variance[most_cells * luxels];
+    const lx_direct_settings settings = {.tracer = f.tracer, .samples = samples};
+    assert_true(lx_direct_light(f.batch, &settings, &f.tile, source, mean, variance));
+    const double taken = (double)samples * lx_direct_sample_weight(f.tracer, source);
+    double total = 0, difference = 0, total_variance = 0;
+    for (uint32_t i = 0; i < luxels; ++i) {
+        double expected[most_cells], spread[most_cells];
+        brute_force(&f, source, i, expected, spread);
+        for (uint32_t c = 0; c < cells; ++c) {
+            const double v = spread[c] * (1 / taken + 1.0 / brute_samples);
+            assert_near((double)mean[c * luxels + i].g, expected[c], 5 * sqrt(v) + 1e-5);
+            total += expected[c];
+            difference += (double)mean[c * luxels + i].g - expected[c];
+            total_variance += v;
+        }
+    }
+    assert_true(total > 0.1);
+    assert_near(difference, 0, 4 * sqrt(total_variance) + 1e-5 * total);
+    end(&f);
+}
+
+static void points_give_what_brute_force_does(void **state) { (void)state; check_source("bulb"); }
+static void spheres_give_what_brute_force_does(void **state) { (void)state; check_source("globe"); }
+static void suns_give_what_brute_force_does(void **state) { (void)state; check_source("sun"); }
+static void rectangles_give_what_brute_force_does(void **state) { (void)state; check_source("panel"); }
+static void disks_give_what_brute_force_does(void **state) { (void)state; check_source("dish"); }
+static void emissive_surfaces_give_what_brute_force_does(void **state) { (void)state; check_source("glow"); }
+static void cells_of_monitors_give_what_brute_force_does(void **state) { (void)state; check_source("screen"); }
+
+static void source_below_the_horizon_gives_nothing_without_a_ray(void **state)
+{
+    (void)state;
+    fixture f;
+    begin(&f, 1);
+    lx_rgb mean[luxels];
+    float variance[luxels];
+    const lx_direct_settings settings = {.tracer = f.tracer, .samples = samples};
+    assert_false(lx_direct_light(f.batch, &settings, &f.tile, source_number(&f, "below"), mean, variance));
+    assert_true(lx_direct_batch_rays(f.batch) == 0);
+    end(&f);
+}
+
+// Half of the tile is in the open: there the first looks do. The sharp lamp needs no more than one ray from each site anywhere.
+static void rays_are_spared_where_neighbours_agree(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"bulb", "globe", "sun", "panel", "dish", "glow"};
+    fixture f;
+    begin(&f, 1);
+    for (size_t k = 0; k < sizeof names / sizeof *names; ++k) {
+        const uint32_t source = source_number(&f, names[k]);
+        lx_rgb mean[luxels], full[luxels];
+        float variance[luxels];
+        lx_direct_settings settings = {.tracer = f.tracer, .samples = samples};
+        const uint64_t before = lx_direct_batch_rays(f.batch);
+        assert_true(lx_direct_light(f.batch, &settings, &f.tile, source, mean, variance));
+        const uint64_t between = lx_direct_batch_rays(f.batch);
+        settings.all_rays = true;
+        assert_true(lx_direct_light(f.batch, &settings, &f.tile, source, full, variance));
+        const uint64_t after = lx_direct_batch_rays(f.batch);
+        assert_true(between - before < (after - between) * 9 / 10);
+        // The same samples, so what differs is what was spared: of open luxels' light its own noise, at most 0.4 %; where a penumbra runs out, the last
+        // ray or two that few looks missed.
+        double difference = 0, squares = 0;
+        for (uint32_t i = 0; i < luxels; ++i) {
+            difference += ((double)mean[i].g - (double)full[i].g) * ((double)mean[i].g - (double)full[i].g);
+            squares += (double)full[i].g * (double)full[i].g;
+        }
+        if (!(difference < 0.01 * 0.01 * squares)) fail_msg("%s: %.2f %% off", names[k], 100 * sqrt(difference / squares));
+    }
+    end(&f);
+}
+
+// Bounds only ever leave out what gives nothing.
+static void bounds_of_the_tile_change_nothing(void **state)
+{
+    (void)state;
+    fixture f;
+    begin(&f, 1);
+    lx_direct_bounds bounds;
+    lx_direct_find_bounds(&f.tile, &bounds);
+    for (uint32_t i = 0; i < luxels * lx_direct_sites; ++i) assert_true(lx_distance(bounds.centre, f.sites[i].position) <= bounds.radius);
+    const lx_direct_settings settings = {.tracer = f.tracer, .samples = samples};
+    for (uint32_t source = 0; source < f.scene->source_count; ++source) {
+        lx_rgb without[most_cells * luxels], with[most_cells * luxels];
+        float variance[most_cells * luxels];
+        f.tile.bounds = NULL;
+        const bool reaches = lx_direct_light(f.batch, &settings, &f.tile, source, without, variance);
+        f.tile.bounds = &bounds;
+        assert_int_equal(lx_direct_light(f.batch, &settings, &f.tile, source, with, variance), reaches);
+        if (reaches) assert_memory_equal(with, without, luxels * lx_tracer_cell_count(f.tracer, source) * sizeof *with);
+    }
+    end(&f);
+}
+
+// Over many streams: what the means scatter by is what their stated variances say, within the half of a tile where the panel's penumbra lies. A variance of
+// four runs overstates that of their union, which is spread better than the runs are for themselves; by no more than a factor of 4 here.
+static void stated_variance_is_that_of_the_mean(void **state)
+{
+    (void)state;
+    enum { trials = 60 };
+    fixture f;
+    begin(&f, 1);
+    const uint32_t source = source_number(&f, "panel");
+    const lx_direct_settings settings = {.tracer = f.tracer, .samples = samples};
+    static double sum[luxels], squares[luxels];
+    double stated = 0, found = 0;
+    for (uint32_t t = 0; t < trials; ++t) {
+        lx_rgb mean[luxels];
+        float variance[luxels];
+        for (uint32_t i = 0; i < luxels; ++i) f.stream[i] = lx_hash_combine(t + 100, i);
+        assert_true(lx_direct_light(f.batch, &settings, &f.tile, source, mean, variance));
+        for (uint32_t i = 0; i < luxels; ++i) {
+            sum[i] += (double)mean[i].g;
+            squares[i] += (double)mean[i].g * (double)mean[i].g;
+            stated += (double)variance[i] / trials;
+        }
+    }
+    for (uint32_t i = 0; i < luxels; ++i) found += (squares[i] - sum[i] * sum[i] / trials) / (trials - 1);
+    if (!(stated > 0.7 * found && stated < 4 * found)) fail_msg("stated %g, found %g", stated, found);
+    end(&f);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(points_give_what_brute_force_does),
+        cmocka_unit_test(spheres_give_what_brute_force_does),
+        cmocka_unit_test(suns_give_what_brute_force_does),
+        cmocka_unit_test(rectangles_give_what_brute_force_does),
+        cmocka_unit_test(disks_give_what_brute_force_does),
+        cmocka_unit_test(emissive_surfaces_give_what_brute_force_does),
+        cmocka_unit_test(cells_of_monitors_give_what_brute_force_does),
+        cmocka_unit_test(source_below_the_horizon_gives_nothing_without_a_ray),
+        cmocka_unit_test(rays_are_spared_where_neighbours_agree),
+        cmocka_unit_test(bounds_of_the_tile_change_nothing),
+        cmocka_unit_test(stated_variance_is_that_of_the_mean),
+    };
+    return cmocka_run_group_tests(tests, fixture_setup, fixture_teardown);
+}
