@@ -42,8 +42,8 @@ static lx_result finish_layer(void *user, size_t task, uint32_t worker, lx_error
     struct finish_scratch *s = &f->scratch[worker];
     const lx_estimate *direct = f->direct + task * f->luxel_count, *indirect = f->indirect + task * f->luxel_count;
     if (f->graph) {
-        lx_denoise_layer(f->graph, direct, s->denoise, s->direct);
-        lx_denoise_layer(f->graph, indirect, s->denoise, s->indirect);
+        lx_denoise_layer(f->graph, lx_light_direct, direct, s->denoise, s->direct);
+        lx_denoise_layer(f->graph, lx_light_indirect, indirect, s->denoise, s->indirect);
         for (uint32_t i = 0; i < f->luxel_count; ++i) s->direct[i] = lx_rgb_add(s->direct[i], s->indirect[i]);
     } else {
         for (uint32_t i = 0; i < f->luxel_count; ++i) s->direct[i] = lx_rgb_add(direct[i].mean, indirect[i].mean);
