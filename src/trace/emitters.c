@@ -174,11 +174,13 @@ static lx_result add_surface(lx_tracer *tracer, lx_emitters *emitters, size_t *t
     return LX_OK;
 }
 
-// A tree over the bright triangles of a source, if there are many.
+// A tree over the bright triangles of a source, if there are many. Not where light is told by cell: every cell is a layer of its own, and those that
+// are far or turned away want their samples as well.
 static lx_result build_tree(const lx_tracer *tracer, lx_emitters *emitters, uint32_t source, lx_light_leaf *leaves, lx_error *error)
 {
     uint32_t count = 0;
     emitters->tree_roots[source] = LX_NO_LIGHT_NODE;
+    if (tracer->source_cells[source] > 0) return LX_OK;
     for (uint32_t i = emitters->first_triangle[source]; i < emitters->first_triangle[source + 1]; ++i) {
         const lx_emitter_triangle *t = &emitters->triangles[i];
         if (!(t->probability > 0)) continue;
