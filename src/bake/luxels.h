@@ -25,6 +25,9 @@ typedef struct lx_settled {
     bool split; ///< Some of the texel lies in another room, or under something low: its light is not that of every place on it.
 } lx_settled;
 
+/// First number of each instance's charts in lx_bake.texel_chart: [instance_count], owned by the caller; NULL: no memory.
+uint32_t *lx_chart_bases(const lx_atlas *atlas);
+
 /// All fragments of a page, grouped by texel: those of texel i are first[i] … first[i + 1] - 1. All of a texel's fragments belong to one chart.
 typedef struct lx_luxel_page {
     uint32_t number;
