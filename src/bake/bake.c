@@ -20,8 +20,9 @@ lx_transport_desc lx_transport_desc_default(void)
 
 lx_bake_desc lx_bake_desc_default(void)
 {
-    lx_bake_desc desc = {.transport = lx_transport_desc_default(), .integrator = LX_INTEGRATOR_PATH, .samples = 256, .noise = 0.02f, .denoise = LX_DENOISE_BUILTIN,
+    lx_bake_desc desc = {.transport = lx_transport_desc_default(), .integrator = LX_INTEGRATOR_GATHER, .samples = 256, .noise = 0.02f, .denoise = LX_DENOISE_BUILTIN,
                          .max_layers = 64};
+    desc.transport.bounces = LX_BOUNCES_INF;
     return desc;
 }
 
@@ -179,14 +180,6 @@ static lx_result fill_page(void *user, size_t page, uint32_t worker, lx_error *e
     return lx_finished_dilate(bake->finished, &job->map.view, (uint32_t)page, bake->atlas->padding, bake->texel_chart + page * texel_count, error);
 }
 
-// Seconds since *start, which becomes now.
-static double lap(double *start)
-{
-    const double now = lx_seconds(), seconds = now - *start;
-    *start = now;
-    return seconds;
-}
-
 static void summarise(const lx_bake_job *job, double start)
 {
     lx_bake *bake = job->bake;
@@ -250,14 +243,14 @@ lx_result lx_bake_run(lx_bake *bake, const lx_progress_sink *progress, lx_error 
     if (!job.pages) return lx_fail_memory(error, "luxels");
     lx_advise_on_scene(bake);
     LX_TRY(place_luxels(&job, error));
-    job.stages.luxels = lap(&stage_start);
+    job.stages.luxels = lx_lap(&stage_start);
     if (bake->desc.integrator == LX_INTEGRATOR_PATH)
         LX_TRY(lx_bake_by_paths(&job, error));
     else
         LX_TRY(lx_bake_by_gathering(&job, error));
-    job.stages.bake = lap(&stage_start);
+    job.stages.bake = lx_lap(&stage_start);
     LX_TRY(lx_pool_run(pool, atlas->page_count, fill_page, &job, "post", progress, error));
-    job.stages.post = lap(&stage_start);
+    job.stages.post = lx_lap(&stage_start);
     summarise(&job, start);
     LX_TRY(check_sum_of_layers(&job, error));
     LX_TRY(lx_advise_on_layers(bake, error));

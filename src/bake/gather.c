@@ -9,6 +9,7 @@
 // Rays never depend on light, so a layer's texels depend on its own sources alone. (Light samples at near hits are drawn per source.)
 #include "bake/bake_job.h"
 
+#include "bake/finish.h"
 #include "bake/gather_rays.h"
 #include "bake/texel_sites.h"
 #include "base/clock.h"
@@ -58,6 +59,12 @@ typedef struct tile_state {
     uint8_t *frozen;   // [layer]
 } tile_state;
 
+// What all layers at their authored colours add up to in a luxel, and how sure that is.
+typedef struct sum_estimate {
+    float value, direct_variance, indirect_variance; // layers taken as independent
+    float difference, squares; // of the halves of the first round: of the sum, and the sum of the layers' squares
+} sum_estimate;
+
 typedef struct gather_job {
     lx_bake_job *job;
     const lx_bake *bake;
@@ -69,8 +76,8 @@ typedef struct gather_job {
     float *scales;          // [row_layers]
     float *authored;        // [layer_count] mean channel of c
     lx_rgb *albedo;         // [luxel]
-    uint16_t *light;        // [luxel][3][row_layers] direct light and what the cache's rays met of sources
-    uint16_t *rows[2];      // [luxel][3][row_layers] radiosity; [1] the pass before
+    float *radiosity;       // [luxel][3][row_layers] of all passes so far, times scale
+    uint16_t *rows[2];      // [luxel][3][row_layers] what the last pass added, and what the next one will; in the end what gather rays read
     uint32_t pass_rays;
     uint32_t *hits;         // [luxel][pass_rays]
     lx_gather_extras *extras; // [tile]; targets are luxels of the tile
@@ -79,7 +86,7 @@ typedef struct gather_job {
     uint8_t *converged;     // [layer] needs no more passes
     tile_state *tiles;
     float *layer_means;     // [layer_count]
-    double *sum_ratio;      // [tile][2]: variance of the sum over layers, and the sum of the layers' variances, of the first round
+    sum_estimate *sums;     // [luxel] of all groups
     gather_scratch *scratch; // [worker]
     uint32_t round_first, round_count; // samples of the round
     lx_gather_settings settings;
@@ -217,12 +224,12 @@ static lx_result light_tile(void *user, size_t task, uint32_t worker, lx_error *
         const lx_rgb albedo = mean_albedo(g, s->luxel[i]);
         g->albedo[s->luxel[i]] = albedo;
         const float channel[3] = {albedo.r, albedo.g, albedo.b};
-        uint16_t *light = g->light + g->stride * s->luxel[i], *row = g->rows[0] + g->stride * s->luxel[i];
+        float *radiosity = g->radiosity + g->stride * s->luxel[i];
+        uint16_t *row = g->rows[0] + g->stride * s->luxel[i];
         for (size_t c = 0; c < 3; ++c)
             for (size_t l = c * g->row_layers; l < (c + 1) * g->row_layers; ++l) {
-                const float value = s->sums[g->stride * i + l] * ray_unit;
-                light[l] = lx_row_encode(value);
-                row[l] = lx_row_encode(channel[c] * value);
+                radiosity[l] = channel[c] * s->sums[g->stride * i + l] * ray_unit;
+                row[l] = lx_row_encode(radiosity[l]);
             }
     }
     // From numbers within the tile's list to luxels.
@@ -276,22 +283,39 @@ static lx_result pass_tile(void *user, size_t task, uint32_t worker, lx_error *e
             const float weight[3] = {e->weight.r, e->weight.g, e->weight.b};
             lx_row_add_scaled(sums, from + g->stride * e->luxel, g->row_layers, weight);
         }
-        const uint16_t *light = g->light + g->stride * i, *old = from + g->stride * i;
+        float *radiosity = g->radiosity + g->stride * i;
         uint16_t *row = g->rows[1] + g->stride * i;
         const lx_rgb a = g->albedo[i];
-        const float albedo[3] = {a.r * LX_ROW_UNIT, a.g * LX_ROW_UNIT, a.b * LX_ROW_UNIT};
+        const float factor[3] = {a.r * LX_ROW_UNIT * unit, a.g * LX_ROW_UNIT * unit, a.b * LX_ROW_UNIT * unit};
         for (size_t c = 0; c < 3; ++c)
             for (size_t l = 0; l < g->layer_count; ++l) {
                 const size_t at = c * g->row_layers + l;
                 if (g->converged[l]) {
-                    row[at] = old[at];
+                    row[at] = 0;
                     continue;
                 }
-                const float value = albedo[c] * (lx_row_decode_small(light[at]) + sums[at] * unit);
+                const float value = factor[c] * sums[at];
                 row[at] = lx_row_encode(value);
-                change[l] += fabs((double)(value - lx_row_decode_small(old[at]) * LX_ROW_UNIT));
-                energy[l] += (double)value;
+                radiosity[at] += value;
+                change[l] += (double)value;
+                energy[l] += (double)radiosity[at];
             }
+    }
+    return LX_OK;
+}
+
+// What gather rays read: rows[0] the sum of all passes, for first hits; rows[1] that without the last, for later ones, which are a bounce further.
+static lx_result sum_rows(void *user, size_t task, uint32_t worker, lx_error *error)
+{
+    (void)worker;
+    (void)error;
+    const gather_job *g = user;
+    const lx_luxel_tile *tile = &g->job->map.tiles[task];
+    const bool truncated = g->bake->desc.transport.bounces != LX_BOUNCES_INF;
+    for (size_t i = g->stride * tile->first; i < g->stride * ((size_t)tile->first + tile->count); ++i) {
+        const float last = truncated ? lx_row_decode_small(g->rows[0][i]) * LX_ROW_UNIT : 0;
+        g->rows[0][i] = lx_row_encode(g->radiosity[i]);
+        g->rows[1][i] = lx_row_encode(g->radiosity[i] - last);
     }
     return LX_OK;
 }
@@ -321,13 +345,14 @@ static lx_result run_passes(gather_job *g, uint32_t wanted, lx_error *error)
             }
             if (g->converged[l]) continue;
             // Each bounce is about `ratio` of the one before: what is still to come is the rest of a geometric series.
-            const double ratio = last[l] > 0 ? fmin(change / last[l], 0.999) : 0.9;
+            const double ratio = last[l] > 0 ? fmin(change / last[l], 0.99) : 0.9;
             if (!(change * ratio / (1 - ratio) > enough_energy * energy)) g->converged[l] = 1;
             last[l] = change;
             all &= g->converged[l] != 0;
         }
         if (all) break;
     }
+    LX_TRY(lx_pool_run(pool, job->map.tile_count, sum_rows, g, "cache", job->progress, error));
 cleanup:
     lx_free(last);
     return result;
@@ -355,13 +380,13 @@ static size_t make_starts(const gather_job *g, gather_scratch *s, uint32_t first
     return count;
 }
 
-// Takes the round's sums into the estimates of one luxel. Returns what the first round tells of the sum of layers in out_ratio.
-static void fold(const gather_job *g, const tile_state *state, const gather_scratch *s, uint32_t index, uint32_t row, double ratio[2])
+// Takes the round's sums into the estimates of one luxel.
+static void fold(const gather_job *g, const tile_state *state, const gather_scratch *s, uint32_t index, uint32_t row)
 {
     const uint32_t n = g->round_count, half = (n + 1) / 2;
     const float *a = s->sums + g->stride * row, *b = s->sums + g->stride * ((size_t)chunk_luxels + row);
     const size_t luxel = s->luxel[index];
-    double whole = 0, apart = 0;
+    sum_estimate *sum = &g->sums[luxel];
     for (uint32_t l = 0; l < g->layer_count; ++l) {
         if (state->frozen[l]) continue;
         const float unit = LX_ROW_UNIT / g->scales[l];
@@ -378,12 +403,10 @@ static void fold(const gather_job *g, const tile_state *state, const gather_scra
         e->mean.g = (e->mean.g * before + mean[1] * (float)n) / after;
         e->mean.b = (e->mean.b * before + mean[2] * (float)n) / after;
         e->variance = (e->variance * before * before + variance * (float)n * (float)n) / (after * after);
-        whole += (double)(difference * g->authored[l]);
-        apart += (double)(difference * difference * g->authored[l] * g->authored[l]);
+        if (g->round_first > 0) continue;
+        sum->difference += difference * g->authored[l];
+        sum->squares += difference * difference * g->authored[l] * g->authored[l];
     }
-    if (g->round_first > 0) return;
-    ratio[0] += whole * whole;
-    ratio[1] += apart;
 }
 
 static float grey(lx_rgb c)
@@ -422,7 +445,7 @@ static lx_result gather_tile(void *user, size_t task, uint32_t worker, lx_error 
         const lx_gather_output out = {.sums = s->sums, .back_hits = s->back_hits};
         const lx_result result = lx_gather_trace(s->batch, &g->settings, s->starts, count, &out, error);
         if (result != LX_OK) return result;
-        for (uint32_t i = first; i < end; ++i) fold(g, state, s, i, i - first, g->sum_ratio + 2 * task);
+        for (uint32_t i = first; i < end; ++i) fold(g, state, s, i, i - first);
     }
     for (uint32_t l = 0; l < g->layer_count; ++l)
         if (!state->frozen[l]) state->samples[l] = g->round_first + g->round_count;
@@ -533,7 +556,8 @@ static lx_result create_scratch(gather_job *g, uint32_t workers, uint32_t round_
     return LX_OK;
 }
 
-static void release(gather_job *g, uint32_t workers)
+// What the final gather was the last to need.
+static void release_cache(gather_job *g, uint32_t workers)
 {
     for (uint32_t i = 0; g->scratch && i < workers; ++i) {
         gather_scratch *s = &g->scratch[i];
@@ -541,22 +565,26 @@ static void release(gather_job *g, uint32_t workers)
         if (s->direct) g->job->ray_count += lx_direct_batch_rays(s->direct);
         lx_gather_batch_destroy(s->batch);
         lx_direct_batch_destroy(s->direct);
-        lx_free(s->sites);
-        lx_free(s->starts);
-        lx_free(s->sums);
-        lx_free(s->mean);
-        lx_free(s->variance);
-        lx_free(s->found);
+        void *arrays[] = {s->sites, s->starts, s->sums, s->mean, s->variance, s->found};
+        for (size_t k = 0; k < sizeof arrays / sizeof *arrays; ++k) lx_free(arrays[k]);
     }
-    lx_free(g->scratch);
-    for (uint32_t t = 0; t < g->job->map.tile_count; ++t) {
-        if (g->extras) lx_free(g->extras[t].items);
-        if (g->tiles) lx_free(g->tiles[t].samples);
-        if (g->tiles) lx_free(g->tiles[t].frozen);
+    for (uint32_t t = 0; g->extras && t < g->job->map.tile_count; ++t) lx_free(g->extras[t].items);
+    void **arrays[] = {(void **)&g->scratch, (void **)&g->extras, (void **)&g->albedo, (void **)&g->radiosity, (void **)&g->rows[0], (void **)&g->rows[1],
+                       (void **)&g->hits};
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) {
+        lx_free(*arrays[i]);
+        *arrays[i] = NULL;
     }
     lx_lookup_release(&g->lookup);
-    void *arrays[] = {g->scales, g->authored, g->albedo, g->light, g->rows[0], g->rows[1], g->hits, g->extras, g->direct, g->indirect, g->pass_change,
-                      g->pass_energy, g->converged, g->tiles, g->layer_means, g->sum_ratio};
+}
+
+static void release(gather_job *g)
+{
+    for (uint32_t t = 0; g->tiles && t < g->job->map.tile_count; ++t) {
+        lx_free(g->tiles[t].samples);
+        lx_free(g->tiles[t].frozen);
+    }
+    void *arrays[] = {g->scales, g->authored, g->direct, g->indirect, g->pass_change, g->pass_energy, g->converged, g->tiles, g->layer_means};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) lx_free(arrays[i]);
 }
 
@@ -569,7 +597,7 @@ static lx_result allocate(gather_job *g, lx_error *error)
     g->scales = lx_calloc_array(g->row_layers, sizeof *g->scales);
     g->authored = lx_calloc_array(layers, sizeof *g->authored);
     g->albedo = lx_calloc_array(cached, sizeof *g->albedo);
-    g->light = lx_calloc_array(cached, g->stride * sizeof *g->light);
+    g->radiosity = lx_calloc_array(cached, g->stride * sizeof *g->radiosity);
     for (int i = 0; i < 2; ++i) g->rows[i] = lx_calloc_array(cached, g->stride * sizeof *g->rows[i]);
     g->hits = lx_malloc_array(cached, g->pass_rays * sizeof *g->hits);
     g->extras = lx_calloc_array(tiles, sizeof *g->extras);
@@ -580,9 +608,8 @@ static lx_result allocate(gather_job *g, lx_error *error)
     g->converged = lx_calloc_array(layers, 1);
     g->tiles = lx_calloc_array(tiles, sizeof *g->tiles);
     g->layer_means = lx_calloc_array(layers, sizeof *g->layer_means);
-    g->sum_ratio = lx_calloc_array(tiles, 2 * sizeof *g->sum_ratio);
-    if (!g->scales || !g->authored || !g->albedo || !g->light || !g->rows[0] || !g->rows[1] || !g->hits || !g->extras || !g->direct || !g->indirect ||
-        !g->pass_change || !g->pass_energy || !g->converged || !g->tiles || !g->layer_means || !g->sum_ratio)
+    if (!g->scales || !g->authored || !g->albedo || !g->radiosity || !g->rows[0] || !g->rows[1] || !g->hits || !g->extras || !g->direct || !g->indirect ||
+        !g->pass_change || !g->pass_energy || !g->converged || !g->tiles || !g->layer_means)
         return lx_fail_memory(error, "layers; --memory bakes them in groups");
     for (size_t t = 0; t < tiles; ++t) {
         g->tiles[t].samples = lx_calloc_array(layers, sizeof *g->tiles[t].samples);
@@ -592,46 +619,100 @@ static lx_result allocate(gather_job *g, lx_error *error)
     return LX_OK;
 }
 
-static lx_result store_layers(const gather_job *g, lx_error *error)
+// Takes a group's layers into the sum.
+static void add_to_sums(const gather_job *g)
 {
-    lx_rgb layer[tile_luxels];
-    for (uint32_t l = 0; l < g->layer_count; ++l)
-        for (uint32_t first = 0; first < g->luxel_count; first += tile_luxels) {
-            const uint32_t count = g->luxel_count - first < tile_luxels ? g->luxel_count - first : tile_luxels;
-            const size_t at = (size_t)l * g->luxel_count + first;
-            for (uint32_t i = 0; i < count; ++i) layer[i] = lx_rgb_add(g->direct[at + i].mean, g->indirect[at + i].mean);
-            const lx_result result = lx_finished_write(g->bake->finished, g->first_layer + l, first, count, layer, error);
-            if (result != LX_OK) return result;
+    for (uint32_t l = 0; l < g->layer_count; ++l) {
+        const lx_estimate *direct = g->direct + (size_t)l * g->luxel_count, *indirect = g->indirect + (size_t)l * g->luxel_count;
+        const float c = g->authored[l];
+        for (uint32_t i = 0; i < g->luxel_count; ++i) {
+            g->sums[i].value += c * (grey(direct[i].mean) + grey(indirect[i].mean));
+            g->sums[i].direct_variance += c * c * direct[i].variance;
+            g->sums[i].indirect_variance += c * c * indirect[i].variance;
         }
-    return LX_OK;
+    }
 }
 
-// Relative standard error of the sum at authored colours. Layers share their rays, so their errors go together: the first round told how much.
-static float estimate_noise(const gather_job *g)
+// Relative standard error of the sum. Layers share their rays, so their errors go together: the first round told how much.
+static float estimate_noise(const lx_bake_job *job, const sum_estimate *sums)
 {
-    const lx_luxel_map *map = &g->job->map.view;
+    const lx_luxel_map *map = &job->map.view;
     double whole = 0, apart = 0, mean = 0, sum = 0;
     uint32_t count = 0;
-    for (uint32_t t = 0; t < g->job->map.tile_count; ++t) {
-        whole += g->sum_ratio[2 * t];
-        apart += g->sum_ratio[2 * t + 1];
-    }
-    const double together = apart > 0 ? whole / apart : 1;
-    for (uint32_t l = 0; l < g->layer_count; ++l) mean += (double)(g->authored[l] * g->layer_means[l]);
     for (uint32_t i = 0; i < map->count; ++i) {
         if (!map->valid[i]) continue;
-        double value = 0, variance = 0;
-        for (uint32_t l = 0; l < g->layer_count; ++l) {
-            const size_t at = (size_t)l * g->luxel_count + i;
-            const double c = (double)g->authored[l];
-            value += c * (double)(grey(g->direct[at].mean) + grey(g->indirect[at].mean));
-            variance += c * c * ((double)g->direct[at].variance + together * (double)g->indirect[at].variance);
-        }
-        value = fmax(value, (double)darkest * mean);
-        if (value > 0) sum += variance / (value * value);
+        whole += (double)sums[i].difference * (double)sums[i].difference;
+        apart += (double)sums[i].squares;
+        mean += (double)sums[i].value;
         ++count;
     }
-    return count > 0 ? (float)sqrt(sum / count) : 0;
+    if (count == 0) return 0;
+    const double together = apart > 0 ? whole / apart : 1;
+    mean /= count;
+    for (uint32_t i = 0; i < map->count; ++i) {
+        if (!map->valid[i]) continue;
+        const double value = fmax((double)sums[i].value, (double)darkest * mean);
+        const double variance = (double)sums[i].direct_variance + together * (double)sums[i].indirect_variance;
+        if (value > 0) sum += variance / (value * value);
+    }
+    return (float)sqrt(sum / count);
+}
+
+static void find_authored(gather_job *g)
+{
+    for (uint32_t l = 0; l < g->layer_count; ++l) {
+        const lx_layer *layer = &g->bake->layers[g->first_layer + l];
+        g->authored[l] = (layer->color[0] + layer->color[1] + layer->color[2]) / 3 * layer->intensity;
+    }
+}
+
+// Bakes layers first … first + count - 1. `uses`: [source_count] room for their uses.
+static lx_result bake_group(lx_bake_job *job, uint32_t first, uint32_t count, lx_source_use *uses, sum_estimate *sums, double start, lx_error *error)
+{
+    lx_result result = LX_OK;
+    lx_bake *bake = job->bake;
+    lx_pool *pool = bake->scene->context->pool;
+    const uint32_t workers = lx_pool_worker_count(pool), samples = bake->desc.samples;
+    const uint32_t bounces = bake->desc.direct_only ? 0 : bake->desc.transport.bounces;
+    double stage_start = lx_seconds();
+    for (uint32_t s = 0; s < bake->source_count; ++s) {
+        uses[s] = bake->uses[s];
+        const bool in_group = uses[s].layer >= (int32_t)first && uses[s].layer < (int32_t)(first + count);
+        uses[s].layer = in_group ? uses[s].layer - (int32_t)first : -1;
+    }
+    gather_job g = {.job = job, .bake = bake, .uses = uses, .first_layer = first, .layer_count = count, .row_layers = lx_row_layers(count), .sums = sums,
+                    .luxel_count = job->map.view.count, .pass_rays = samples < 128 ? 16 : most_pass_rays};
+    g.stride = 3 * (size_t)g.row_layers;
+    g.settings.bounces = bounces;
+    LX_TRY(allocate(&g, error));
+    find_authored(&g);
+    choose_scales(&g);
+    LX_TRY(lx_lookup_create(bake, &job->map.view, &g.lookup, error));
+    lx_lookup_invalidate(&g.lookup, &job->map.view, job->map.valid);
+    LX_TRY(create_scratch(&g, workers, samples < largest_round ? samples : largest_round, error));
+    LX_TRY(lx_pool_run_weighted(pool, job->map.tile_count, job->tile_weights, light_tile, &g, "direct", job->progress, error));
+    job->stages.direct += lx_lap(&stage_start);
+    if (bounces > 0) {
+        LX_TRY(lx_pool_run(pool, job->map.tile_count, sort_extras, &g, "cache", job->progress, error));
+        LX_TRY(run_passes(&g, bounces == LX_BOUNCES_INF ? bounces : bounces - 1, error));
+    }
+    job->stages.cache += lx_lap(&stage_start);
+    g.settings = (lx_gather_settings){.tracer = bake->tracer, .lookup = &g.lookup, .uses = g.uses, .scales = g.scales, .row_layers = g.row_layers,
+                                      .bounces = bounces, .direct = !bake->desc.indirect_only, .near_texels = near_texels};
+    if (bounces > 0) {
+        g.settings.rows = g.rows[0];
+        g.settings.rows_later = bounces > 1 ? g.rows[1] : NULL;
+    }
+    LX_TRY(run_rounds(&g, start, error));
+    job->stages.gather += lx_lap(&stage_start);
+    add_to_sums(&g);
+    release_cache(&g, workers);
+    LX_TRY(lx_bake_finish_layers(job, g.direct, g.indirect, first, count, error));
+    job->stages.denoise += lx_lap(&stage_start);
+cleanup:
+    release_cache(&g, workers);
+    release(&g);
+    return result;
 }
 
 lx_result lx_bake_by_gathering(lx_bake_job *job, lx_error *error)
@@ -639,36 +720,20 @@ lx_result lx_bake_by_gathering(lx_bake_job *job, lx_error *error)
     lx_result result = LX_OK;
     const double start = lx_seconds();
     lx_bake *bake = job->bake;
-    lx_pool *pool = bake->scene->context->pool;
-    const uint32_t workers = lx_pool_worker_count(pool), samples = bake->desc.samples;
-    const uint32_t bounces = bake->desc.direct_only ? 0 : bake->desc.transport.bounces;
-    gather_job g = {.job = job, .bake = bake, .uses = bake->uses, .layer_count = bake->layer_count, .row_layers = lx_row_layers(bake->layer_count),
-                    .luxel_count = job->map.view.count, .pass_rays = samples < 128 ? 16 : most_pass_rays};
-    g.stride = 3 * (size_t)g.row_layers;
-    g.settings.bounces = bounces;
-    LX_TRY(allocate(&g, error));
-    for (uint32_t l = 0; l < bake->layer_count; ++l)
-        g.authored[l] = (bake->layers[l].color[0] + bake->layers[l].color[1] + bake->layers[l].color[2]) / 3 * bake->layers[l].intensity;
-    choose_scales(&g);
-    LX_TRY(lx_lookup_create(bake, &job->map.view, &g.lookup, error));
-    lx_lookup_invalidate(&g.lookup, &job->map.view, job->map.valid);
-    LX_TRY(create_scratch(&g, workers, samples < largest_round ? samples : largest_round, error));
-    LX_TRY(lx_pool_run_weighted(pool, job->map.tile_count, job->tile_weights, light_tile, &g, "direct", job->progress, error));
-    if (bounces > 0) {
-        LX_TRY(lx_pool_run(pool, job->map.tile_count, sort_extras, &g, "cache", job->progress, error));
-        LX_TRY(run_passes(&g, bounces == LX_BOUNCES_INF ? bounces : bounces - 1, error));
+    lx_source_use *uses = lx_calloc_array(bake->source_count, sizeof *uses);
+    sum_estimate *sums = lx_calloc_array(job->map.view.count, sizeof *sums);
+    if (!uses || !sums) {
+        result = lx_fail_memory(error, "layers");
+        goto cleanup;
     }
-    g.settings = (lx_gather_settings){.tracer = bake->tracer, .lookup = &g.lookup, .uses = g.uses, .scales = g.scales, .row_layers = g.row_layers,
-                                      .bounces = bounces, .direct = !bake->desc.indirect_only, .near_texels = near_texels};
-    if (bounces > 0) {
-        g.settings.rows = g.rows[0];
-        g.settings.rows_later = bounces == LX_BOUNCES_INF ? g.rows[0] : bounces > 1 ? g.rows[1] : NULL;
+    for (uint32_t first = 0; first < bake->layer_count; ++job->group_count) {
+        const uint32_t count = bake->layer_count - first;
+        LX_TRY(bake_group(job, first, count, uses, sums, start, error));
+        first += count;
     }
-    LX_TRY(run_rounds(&g, start, error));
-    job->noise = estimate_noise(&g);
-    job->group_count = 1;
-    LX_TRY(store_layers(&g, error));
+    job->noise = estimate_noise(job, sums);
 cleanup:
-    release(&g, workers);
+    lx_free(uses);
+    lx_free(sums);
     return result;
 }

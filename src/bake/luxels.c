@@ -135,6 +135,67 @@ cleanup:
     return result;
 }
 
+// ---- gaps of one texel between charts --------------------------------------------------------------------------------------
+
+// How much bilinear filtering of the surface within texel `neighbour` reads the texel (x, y) beside it.
+static double need_of(const lx_bake *bake, const lx_luxel_page *page, uint32_t neighbour, uint32_t x, uint32_t y)
+{
+    const uint32_t size = bake->atlas->page_size;
+    const double nx = neighbour % size, ny = neighbour / size, cx = x + 0.5, cy = y + 0.5;
+    const lx_point low = {fmax(nx, cx - 1), fmax(ny, cy - 1)}, high = {fmin(nx + 1, cx + 1), fmin(ny + 1, cy + 1)};
+    double sum = 0;
+    for (uint32_t f = page->first[neighbour]; f < page->first[neighbour + 1]; ++f) {
+        const lx_surface *surface = &bake->scene->surfaces[page->fragments[f].surface];
+        lx_point corner[3];
+        if (!lx_triangle_on_page(bake->atlas, surface->instance, surface->primitive, page->fragments[f].triangle, corner)) continue;
+        const lx_polygon part = lx_clip_to_rect(corner, low, high);
+        if (part.count < 3) continue;
+        lx_point middle = {0, 0};
+        for (int i = 0; i < part.count; ++i) middle = (lx_point){middle.x + part.p[i].x / part.count, middle.y + part.p[i].y / part.count};
+        sum += lx_polygon_area(&part) * (1 - fabs(middle.x - cx)) * (1 - fabs(middle.y - cy));
+    }
+    return sum;
+}
+
+// An empty texel that touches several charts goes to the one whose surface is filtered with it most. Dilation knows whole texels only: where files bring
+// charts that are a texel apart, it would give every second gap to the chart that has no use for it, and its light would show in the other.
+static void claim_gap(lx_bake *bake, const lx_luxel_page *page, uint32_t x, uint32_t y)
+{
+    const uint32_t size = bake->atlas->page_size;
+    uint32_t *charts = bake->texel_chart + (size_t)page->number * size * size;
+    uint32_t chart[8], count = 0;
+    double need[8];
+    for (int dy = -1; dy <= 1; ++dy)
+        for (int dx = -1; dx <= 1; ++dx) {
+            const int64_t nx = (int64_t)x + dx, ny = (int64_t)y + dy;
+            if (nx < 0 || ny < 0 || nx >= size || ny >= size) continue;
+            const uint32_t neighbour = (uint32_t)(ny * size + nx);
+            if (page->first[neighbour] == page->first[neighbour + 1]) continue;
+            uint32_t i = 0;
+            while (i < count && chart[i] != charts[neighbour]) ++i;
+            if (i == count) {
+                chart[count] = charts[neighbour];
+                need[count++] = 0;
+            }
+            need[i] += need_of(bake, page, neighbour, x, y);
+        }
+    if (count < 2) return;
+    uint32_t best = 0;
+    for (uint32_t i = 1; i < count; ++i)
+        if (need[i] > need[best] || (need[i] == need[best] && chart[i] < chart[best])) best = i;
+    if (need[best] > 0) charts[(size_t)y * size + x] = chart[best];
+}
+
+static void claim_gaps(lx_bake *bake, const lx_luxel_page *page)
+{
+    const uint32_t size = bake->atlas->page_size;
+    for (uint32_t y = 0; y < size; ++y)
+        for (uint32_t x = 0; x < size; ++x) {
+            const size_t texel = (size_t)y * size + x;
+            if (page->first[texel] == page->first[texel + 1]) claim_gap(bake, page, x, y);
+        }
+}
+
 lx_result lx_luxels_rasterise(lx_bake *bake, uint32_t page, lx_luxel_page *out, lx_error *error)
 {
     lx_result result = LX_OK;
@@ -149,6 +210,7 @@ lx_result lx_luxels_rasterise(lx_bake *bake, uint32_t page, lx_luxel_page *out, 
         goto cleanup;
     }
     LX_TRY(group_by_texel(bake, page, &raw, out, error));
+    claim_gaps(bake, out);
     out->state = lx_malloc_array((size_t)size * size, sizeof *out->state);
     out->settled = lx_calloc_array(out->block_count, sizeof *out->settled);
     if (!out->state || !out->settled) {

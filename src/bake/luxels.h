@@ -38,7 +38,8 @@ typedef struct lx_luxel_page {
 #define LX_SITES_INVALID 0xfffeu
 
 /// Conservative rasterisation of page `page`: fills `out`, and bake->texel_chart and bake->texel_coverage of that page.
-/// Where two charts touch one texel the larger share wins.
+/// Where two charts touch one texel the larger share wins; an empty texel between two charts goes to the one whose bilinear filtering reads it most (in
+/// texel_chart alone; its coverage stays 0).
 lx_result lx_luxels_rasterise(lx_bake *bake, uint32_t page, lx_luxel_page *out, lx_error *error);
 void lx_luxels_release(lx_luxel_page *page);
 

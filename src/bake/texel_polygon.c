@@ -16,13 +16,13 @@ static lx_polygon clip(const lx_polygon *in, int axis, double sign, double limit
     return out;
 }
 
-lx_polygon lx_clip_to_texel(const lx_point corner[3], double x, double y)
+lx_polygon lx_clip_to_rect(const lx_point corner[3], lx_point low, lx_point high)
 {
     lx_polygon p = {.p = {corner[0], corner[1], corner[2]}, .count = 3};
-    p = clip(&p, 0, 1, x);
-    if (p.count) p = clip(&p, 0, -1, x + 1);
-    if (p.count) p = clip(&p, 1, 1, y);
-    if (p.count) p = clip(&p, 1, -1, y + 1);
+    p = clip(&p, 0, 1, low.x);
+    if (p.count) p = clip(&p, 0, -1, high.x);
+    if (p.count) p = clip(&p, 1, 1, low.y);
+    if (p.count) p = clip(&p, 1, -1, high.y);
     return p;
 }
 

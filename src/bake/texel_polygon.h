@@ -24,8 +24,13 @@ static inline double lx_cross_of(lx_point a, lx_point b, lx_point c)
 
 double lx_polygon_area(const lx_polygon *p);
 
-/// The part of a triangle within the square (x, y) … (x + 1, y + 1); count 0: none.
-lx_polygon lx_clip_to_texel(const lx_point corner[3], double x, double y);
+/// The part of a triangle within a rectangle; count 0: none.
+lx_polygon lx_clip_to_rect(const lx_point corner[3], lx_point low, lx_point high);
+/// The same for the square of a texel, (x, y) … (x + 1, y + 1).
+static inline lx_polygon lx_clip_to_texel(const lx_point corner[3], double x, double y)
+{
+    return lx_clip_to_rect(corner, (lx_point){x, y}, (lx_point){x + 1, y + 1});
+}
 
 /// A triangle's corners on its page. False: it has no texels.
 bool lx_triangle_on_page(const lx_atlas *atlas, uint32_t instance, uint32_t primitive, uint32_t triangle, lx_point out[3]);

@@ -21,6 +21,7 @@ static const lx_image *image_of(const lx_scene *scene, const lx_texture_slot *sl
 static uint32_t wrap_texel(float t, uint32_t size, lx_wrap wrap)
 {
     const float n = (float)size;
+    if (t >= 0 && t < n) return (uint32_t)t;
     if (wrap == LX_WRAP_CLAMP) return t < 0 ? 0 : t >= n ? size - 1 : (uint32_t)t;
     const float period = wrap == LX_WRAP_MIRROR ? 2 * n : n;
     float r = t - period * floorf(t / period);
@@ -34,7 +35,7 @@ static lx_vec4 fetch(const lx_image *image, uint32_t x, uint32_t y, bool srgb)
 {
     const uint8_t *p = image->u8 + ((size_t)y * image->width + x) * image->channels;
     const uint8_t r = p[0], g = image->channels >= 3 ? p[1] : r, b = image->channels >= 3 ? p[2] : r;
-    const float alpha = image->channels == 4 ? p[3] / 255.0f : image->channels == 2 ? p[1] / 255.0f : 1;
+    const float alpha = image->channels == 4 ? (p[3] == 255 ? 1 : p[3] / 255.0f) : image->channels == 2 ? p[1] / 255.0f : 1;
     if (srgb) return (lx_vec4){lx_srgb_byte_to_linear[r], lx_srgb_byte_to_linear[g], lx_srgb_byte_to_linear[b], alpha};
     return (lx_vec4){r / 255.0f, g / 255.0f, b / 255.0f, alpha};
 }

@@ -1,7 +1,6 @@
 // Direct light by tile: where to spare shadow rays.
 //
-// Sample i of a luxel starts from site 5 i mod 16: any 16 samples in a row look at every site, any 4 at sites that lie well apart (sites are
-// stratified by their number, so four that differ in both digits to the base 4 are).
+// Sample i of a luxel starts from site i mod 16: any 16 samples in a row look at every site, the first 4 at sites that lie well apart.
 //
 // Every luxel sends the rays of its first four samples. Where they all met the same (all clear, all dark, the same pane of glass), in the luxel
 // and in its neighbours, the luxel is taken to see the source so altogether, and its light is that of its samples without further rays. Else it sends the
@@ -181,7 +180,7 @@ static bool is_sharp(const lx_tracer *tracer, uint32_t source)
 
 static bool take_sample(const job *j, uint32_t luxel, uint32_t i, lx_ray *ray, lx_rgb *light, uint32_t *cell)
 {
-    const lx_receiver *site = &j->tile->sites[(size_t)luxel * lx_direct_sites + 5 * i % lx_direct_sites];
+    const lx_receiver *site = &j->tile->sites[(size_t)luxel * lx_direct_sites + i % lx_direct_sites];
     if (lx_source_bound(j->tracer, j->source, site) == 0) return false;
     j->b->luxels[luxel].possible = true;
     const lx_vec2 u = lx_sobol_pair(i, lx_hash_combine(j->tile->stream[luxel], j->key));

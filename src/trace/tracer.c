@@ -9,6 +9,8 @@
 
 static const float largest_albedo = 0.99f; // keeps light finite in closed white rooms
 
+static void shade_even_surfaces(lx_tracer *tracer);
+
 // ---- surfaces --------------------------------------------------------------------------------------------------------
 
 typedef struct surface_point {
@@ -55,7 +57,7 @@ static lx_vec4 base_color_at(const lx_tracer *tracer, const lx_material *m, cons
 
 static const lx_material *material_of(const lx_tracer *tracer, uint32_t surface)
 {
-    return &tracer->scene->materials[tracer->scene->surfaces[surface].material];
+    return tracer->surfaces[surface].material;
 }
 
 // How much a surface hides: alpha as its mode says, 0 in a hole.
@@ -155,6 +157,13 @@ static lx_result build_surfaces(lx_tracer *tracer, bool include_dynamic, lx_erro
         lx_traced_surface *out = &tracer->surfaces[i];
         out->kind = classify(scene, s);
         out->orientation = lx_mat4_determinant3(instance->transform) < 0 ? -1.0f : 1.0f;
+        out->material = &scene->materials[s->material];
+        out->indices = primitive->indices;
+        out->normals = primitive->normals;
+        for (int k = 0; k < 3; ++k) {
+            const lx_vec3 axis = {k == 0, k == 1, k == 2};
+            out->normal_axes[k] = lx_scale(lx_mat4_normal(instance->transform, axis), out->orientation);
+        }
         if (!instance->is_static && !include_dynamic) continue;
         out->positions = next;
         for (uint32_t v = 0; v < primitive->vertex_count; ++v)
@@ -330,6 +339,7 @@ lx_result lx_tracer_create(const lx_scene *scene, const lx_transport_desc *trans
     LX_TRY(lx_emitters_build(tracer, error));
     LX_TRY(build_scales(tracer, error));
     LX_TRY(build_spheres(tracer, error));
+    shade_even_surfaces(tracer);
     *out_tracer = tracer;
     tracer = NULL;
 cleanup:
@@ -445,19 +455,19 @@ static lx_vec3 geometric_normal(const lx_tracer *tracer, uint32_t surface, const
     return lx_scale(lx_normalize_or(cross, (lx_vec3){0, 1, 0}), tracer->surfaces[surface].orientation);
 }
 
-static lx_vec3 world_normal(const lx_tracer *tracer, uint32_t surface, lx_vec3 local)
+static lx_vec3 world_normal(const lx_traced_surface *surface, lx_vec3 local)
 {
-    const lx_mat4 *transform = &tracer->scene->instances[tracer->scene->surfaces[surface].instance].transform;
-    return lx_scale(lx_mat4_normal(*transform, local), tracer->surfaces[surface].orientation);
+    const lx_vec3 *axes = surface->normal_axes;
+    return lx_add(lx_add(lx_scale(axes[0], local.x), lx_scale(axes[1], local.y)), lx_scale(axes[2], local.z));
 }
 
-static lx_vec3 interpolated_normal(const lx_tracer *tracer, uint32_t surface, const surface_point *p, lx_vec3 geometric)
+static lx_vec3 interpolated_normal(const lx_traced_surface *surface, uint32_t triangle, float u, float v, lx_vec3 geometric)
 {
-    const lx_vec3 *normals = p->primitive->normals;
-    if (!normals) return geometric;
-    const lx_vec3 local = lx_add(lx_add(lx_scale(normals[p->corner[0]], p->w0), lx_scale(normals[p->corner[1]], p->u)),
-                                 lx_scale(normals[p->corner[2]], p->v));
-    const lx_vec3 n = lx_normalize_or(world_normal(tracer, surface, local), geometric);
+    if (!surface->normals) return geometric;
+    const uint32_t *corner = surface->indices + 3 * (size_t)triangle;
+    const lx_vec3 local = lx_add(lx_add(lx_scale(surface->normals[corner[0]], 1 - u - v), lx_scale(surface->normals[corner[1]], u)),
+                                 lx_scale(surface->normals[corner[2]], v));
+    const lx_vec3 n = lx_normalize_or(world_normal(surface, local), geometric);
     // A vertex normal that points behind the triangle can't tell which way is up; the triangle can.
     return lx_dot(n, geometric) > 0 ? n : geometric;
 }
@@ -475,7 +485,7 @@ bool lx_triangle_normals(const lx_tracer *tracer, uint32_t surface, uint32_t tri
     const surface_point p = point_of(tracer, surface, triangle, 0, 0);
     if (!p.primitive->normals) return false;
     for (int i = 0; i < 3; ++i)
-        normals[i] = lx_normalize_or(world_normal(tracer, surface, p.primitive->normals[p.corner[i]]), (lx_vec3){0, 0, 0});
+        normals[i] = lx_normalize_or(world_normal(&tracer->surfaces[surface], p.primitive->normals[p.corner[i]]), (lx_vec3){0, 0, 0});
     return true;
 }
 
@@ -483,8 +493,7 @@ lx_vec3 lx_normal_at(const lx_tracer *tracer, uint32_t surface, uint32_t triangl
 {
     lx_vec3 corners[3];
     lx_triangle_corners(tracer, surface, triangle, corners);
-    const surface_point p = point_of(tracer, surface, triangle, u, v);
-    return interpolated_normal(tracer, surface, &p, geometric_normal(tracer, surface, corners));
+    return interpolated_normal(&tracer->surfaces[surface], triangle, u, v, geometric_normal(tracer, surface, corners));
 }
 
 bool lx_surface_is_plain(const lx_tracer *tracer, uint32_t surface)
@@ -502,44 +511,112 @@ bool lx_surface_is_solid(const lx_tracer *tracer, uint32_t surface)
     return tracer->surfaces[surface].kind == LX_SURFACE_OPAQUE && !lx_surface_is_double_sided(tracer, surface);
 }
 
-static lx_shading shade(const lx_tracer *tracer, lx_vec3 direction, uint32_t surface, uint32_t triangle, float u, float v)
+// Diffuse reflectance of what has base colour `base` and is not unlit.
+static lx_rgb albedo_at(const lx_tracer *tracer, const lx_material *m, const surface_point *p, lx_vec4 base)
+{
+    float scale = 1;
+    if (m->metallic > 0) {
+        const lx_vec4 mr = sample_slot(tracer, p, &m->metallic_roughness_texture, false);
+        const float metallic = lx_clamp(m->metallic * mr.z, 0, 1), roughness = lx_clamp(m->roughness * mr.y, 0, 1);
+        scale = (1 - metallic) + metallic * roughness * roughness * 0.5f;
+    }
+    return (lx_rgb){lx_min(base.x * scale, largest_albedo), lx_min(base.y * scale, largest_albedo), lx_min(base.z * scale, largest_albedo)};
+}
+
+// What the material says of a point: opacity, albedo, transmittance, emission of `s`, for which `lit` is set.
+static void shade_material(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, float u, float v, lx_shading *s)
 {
     const lx_material *m = material_of(tracer, surface);
     const surface_point p = point_of(tracer, surface, triangle, u, v);
-    lx_vec3 corner[3];
-    lx_triangle_corners(tracer, surface, triangle, corner);
-    lx_shading s;
-    s.position = lx_add(lx_add(lx_scale(corner[0], p.w0), lx_scale(corner[1], u)), lx_scale(corner[2], v));
-    s.geometric_normal = geometric_normal(tracer, surface, corner);
-    s.normal = interpolated_normal(tracer, surface, &p, s.geometric_normal);
-    s.front = lx_dot(s.geometric_normal, direction) < 0;
-    s.lit = s.front || m->double_sided;
     const lx_vec4 base = base_color_at(tracer, m, &p);
-    split_light(tracer, surface, m, &p, base, &s.opacity, &s.transmittance);
-    if (tracer->surfaces[surface].kind == LX_SURFACE_OPAQUE) {
-        s.opacity = 1;
-        s.transmittance = (lx_rgb){0, 0, 0};
-    }
-    if (m->unlit) {
-        s.albedo = (lx_rgb){0, 0, 0};
-    } else {
-        const lx_vec4 mr = sample_slot(tracer, &p, &m->metallic_roughness_texture, false);
-        const float metallic = lx_clamp(m->metallic * mr.z, 0, 1), roughness = lx_clamp(m->roughness * mr.y, 0, 1);
-        const float scale = (1 - metallic) + metallic * roughness * roughness * 0.5f;
-        s.albedo = (lx_rgb){lx_min(base.x * scale, largest_albedo), lx_min(base.y * scale, largest_albedo),
-                            lx_min(base.z * scale, largest_albedo)};
-    }
-    s.emission = (lx_rgb){0, 0, 0};
+    s->opacity = 1;
+    s->transmittance = (lx_rgb){0, 0, 0};
+    if (tracer->surfaces[surface].kind != LX_SURFACE_OPAQUE) split_light(tracer, surface, m, &p, base, &s->opacity, &s->transmittance);
+    s->albedo = s->emission = (lx_rgb){0, 0, 0};
+    if (!m->unlit) s->albedo = albedo_at(tracer, m, &p, base);
     if (m->unlit)
-        s.emission = (lx_rgb){base.x, base.y, base.z};
-    else if (s.lit && (lx_material_emits(m) || lx_surface_is_told_by_cell(tracer, surface)))
-        s.emission = lx_surface_emission(tracer, surface, triangle, u, v);
-    return s;
+        s->emission = (lx_rgb){base.x, base.y, base.z};
+    else if (s->lit && (lx_material_emits(m) || lx_surface_is_told_by_cell(tracer, surface)))
+        s->emission = lx_surface_emission(tracer, surface, triangle, u, v);
+}
+
+static bool is_even(const lx_tracer *tracer, uint32_t surface)
+{
+    const lx_material *m = material_of(tracer, surface);
+    return m->base_color_texture.texture < 0 && !tracer->scene->primitives[tracer->scene->surfaces[surface].primitive].colors &&
+           (m->transmission_texture.texture < 0 || m->transmission == 0) && (m->metallic_roughness_texture.texture < 0 || m->metallic == 0) &&
+           (m->emissive_texture.texture < 0 || !lx_material_emits(m) || lx_surface_is_told_by_cell(tracer, surface));
+}
+
+// Shades even surfaces once for all hits.
+static void shade_even_surfaces(lx_tracer *tracer)
+{
+    for (uint32_t i = 0; i < tracer->scene->surface_count; ++i) {
+        lx_traced_surface *surface = &tracer->surfaces[i];
+        surface->even = surface->positions && is_even(tracer, i);
+        if (!surface->even) continue;
+        lx_shading s = {.lit = true};
+        shade_material(tracer, i, 0, 0, 0, &s);
+        surface->opacity = s.opacity;
+        surface->albedo = s.albedo;
+        surface->transmittance = s.transmittance;
+        surface->emission = s.emission;
+    }
+}
+
+static void shade(const lx_tracer *tracer, const lx_hit *hit, lx_shading *s)
+{
+    const lx_traced_surface *surface = &tracer->surfaces[hit->surface];
+    const float u = hit->u, v = hit->v;
+    const uint32_t *indices = surface->indices + 3 * (size_t)hit->triangle;
+    const lx_vec3 corner[3] = {surface->positions[indices[0]], surface->positions[indices[1]], surface->positions[indices[2]]};
+    s->position = lx_add(lx_add(lx_scale(corner[0], 1 - u - v), lx_scale(corner[1], u)), lx_scale(corner[2], v));
+    s->geometric_normal = geometric_normal(tracer, hit->surface, corner);
+    s->normal = interpolated_normal(surface, hit->triangle, u, v, s->geometric_normal);
+    s->front = !hit->back;
+    s->lit = s->front || surface->material->double_sided;
+    if (!surface->even) {
+        shade_material(tracer, hit->surface, hit->triangle, u, v, s);
+        return;
+    }
+    s->opacity = surface->opacity;
+    s->albedo = surface->albedo;
+    s->transmittance = surface->transmittance;
+    s->emission = s->lit || surface->material->unlit ? surface->emission : (lx_rgb){0, 0, 0};
+}
+
+#if defined(__GNUC__)
+#define PREFETCH(address) __builtin_prefetch(address)
+#else
+#define PREFETCH(address) ((void)(address))
+#endif
+
+// Hits lie anywhere in memory: corners' numbers are asked for some hits ahead, then the corners by their numbers.
+static void prefetch_indices(const lx_tracer *tracer, const lx_hit *hit)
+{
+    if (hit->surface != LX_MISS) PREFETCH(tracer->surfaces[hit->surface].indices + 3 * (size_t)hit->triangle);
+}
+
+static void prefetch_corners(const lx_tracer *tracer, const lx_hit *hit)
+{
+    if (hit->surface == LX_MISS) return;
+    const lx_traced_surface *surface = &tracer->surfaces[hit->surface];
+    const uint32_t *indices = surface->indices + 3 * (size_t)hit->triangle;
+    for (int k = 0; k < 3; ++k) {
+        PREFETCH(surface->positions + indices[k]);
+        if (surface->normals) PREFETCH(surface->normals + indices[k]);
+    }
 }
 
 void lx_shade_hits(const lx_tracer *tracer, const lx_ray *rays, const lx_hit *hits, lx_shading *shading, size_t count)
 {
-    for (size_t i = 0; i < count; ++i)
-        if (hits[i].surface != LX_MISS)
-            shading[i] = shade(tracer, rays[i].direction, hits[i].surface, hits[i].triangle, hits[i].u, hits[i].v);
+    enum { indices_ahead = 32, corners_ahead = 12 };
+    (void)rays;
+    for (size_t i = 0; i < count && i < indices_ahead; ++i) prefetch_indices(tracer, &hits[i]);
+    for (size_t i = 0; i < count && i < corners_ahead; ++i) prefetch_corners(tracer, &hits[i]);
+    for (size_t i = 0; i < count; ++i) {
+        if (i + indices_ahead < count) prefetch_indices(tracer, &hits[i + indices_ahead]);
+        if (i + corners_ahead < count) prefetch_corners(tracer, &hits[i + corners_ahead]);
+        if (hits[i].surface != LX_MISS) shade(tracer, &hits[i], &shading[i]);
+    }
 }

@@ -18,6 +18,14 @@ typedef struct lx_traced_surface {
     const lx_vec3 *positions; ///< World, [vertex_count] of its primitive; NULL if it is not traced.
     float orientation;        ///< Sign of the instance's determinant.
     uint32_t first_emitter_triangle; ///< Into emitters.triangles if the surface emits.
+    // What shading reads of every hit, in one place.
+    const lx_material *material;
+    const uint32_t *indices;
+    const lx_vec3 *normals;   ///< Of the primitive, local; NULL: flat.
+    lx_vec3 normal_axes[3];   ///< A local normal n becomes n.x [0] + n.y [1] + n.z [2] in the world, up to length.
+    bool even;                ///< No texture and no vertex colour counts: what follows holds all over its lit side.
+    float opacity;
+    lx_rgb albedo, transmittance, emission;
 } lx_traced_surface;
 
 /// Where a source is and how much it can give, for leaving it out cheaply.
