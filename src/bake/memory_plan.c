@@ -38,7 +38,7 @@ static const struct {
     .denoise_scratch = 5 * sizeof(lx_estimate) + 2 * 5 * sizeof(float) + 2 * sizeof(float),
     .place = 2 * sizeof(uint32_t),
     .tile = 2 * sizeof(double) + sizeof(uint32_t) + 1,
-    .batches = 8 << 20,
+    .batches = 4 << 20,
     .worker_row = lx_luxel_tile_edge * lx_luxel_tile_edge * 3 * sizeof(float),
     .worker_cell = lx_luxel_tile_edge * lx_luxel_tile_edge * (sizeof(lx_rgb) + sizeof(float)),
 };
