@@ -6,7 +6,6 @@
 #include "base/error.h"
 #include "base/memory.h"
 #include "post/denoise.h"
-#include "store/pack.h"
 
 // What gathering keeps, in bytes.
 static const struct {
@@ -43,7 +42,7 @@ static const struct {
     .worker_cell = lx_luxel_tile_edge * lx_luxel_tile_edge * (sizeof(lx_rgb) + sizeof(float)),
 };
 
-enum { most_pass_rays = 32, bare_process_bytes = 12 << 20 }; // libraries and what they set up at once
+enum { block_texels = lx_luxel_tile_edge * lx_luxel_tile_edge, most_pass_rays = 32, bare_process_bytes = 12 << 20 }; // libraries and what they set up at once
 
 static uint64_t texel_count(const lx_bake *bake)
 {
@@ -98,7 +97,9 @@ static uint64_t save_bytes(const lx_bake *bake, uint64_t resident, uint64_t fini
     const uint64_t page = (uint64_t)bake->atlas->page_size * bake->atlas->page_size;
     const uint64_t again = bake->created_bytes > bare_process_bytes ? bake->created_bytes - bare_process_bytes : 0;
     const uint64_t images = page * 3 * sizeof(float) + page * (3 * sizeof(float) + sizeof(uint32_t)) / 3;
-    const uint64_t pack = (page + page / 3) * bake->atlas->page_count * bake->layer_count * sizeof(uint32_t);
+    // Of the pack: its index, and a row of blocks of all layers, for which it is read back.
+    const uint64_t rows = (uint64_t)bake->layer_count * sizeof(uint32_t);
+    const uint64_t pack = rows * (texel_count(bake) * 4 / 3 / block_texels + (uint64_t)bake->atlas->page_size * lx_luxel_tile_edge);
     const uint64_t pages = texel_count(bake) * 3 * sizeof(float);
     return resident + finished + images + pack + again + pages;
 }
