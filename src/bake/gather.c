@@ -32,7 +32,7 @@ enum {
     most_passes = 1000,
 };
 
-static const float near_texels = 2.0f;
+static const float near_texels = 2.0f, pass_near_texels = 1.0f;
 static const double enough_energy = 1e-3; // of a layer's: what later bounces may still have added
 static const float darkest = 0.01f;      // of a layer's mean: below it errors count as if the texel were that bright
 static const uint32_t cache_stream = 0x63616368;
@@ -206,7 +206,7 @@ static lx_result light_tile(void *user, size_t task, uint32_t worker, lx_error *
     const float ray_unit = LX_ROW_UNIT / (float)g->pass_rays;
     for (size_t i = 0; i < g->stride * s->count; ++i) s->sums[i] *= 1 / ray_unit;
     const lx_gather_settings ray_settings = {.tracer = g->bake->tracer, .lookup = &g->lookup, .uses = g->uses, .scales = g->scales,
-                                             .row_layers = g->row_layers, .bounces = g->settings.bounces, .everything = true};
+                                             .row_layers = g->row_layers, .bounces = g->settings.bounces, .everything = true, .near_texels = pass_near_texels};
     memset(s->back_hits, 0, sizeof s->back_hits);
     for (uint32_t first = 0; first < s->count; first += chunk_luxels) {
         const uint32_t end = first + chunk_luxels < s->count ? first + chunk_luxels : s->count;
@@ -667,6 +667,22 @@ static void find_authored(gather_job *g)
     }
 }
 
+// Luxels that answer for what is hit on them: valid ones, unless they reach into two rooms.
+static lx_result choose_answers(gather_job *g, lx_error *error)
+{
+    const lx_bake_map *map = &g->job->map;
+    uint8_t *answers = lx_malloc_array(map->view.count, 1);
+    if (!answers) return lx_fail_memory(error, "luxels");
+    for (uint32_t i = 0; i < map->view.count; ++i) {
+        uint32_t texel;
+        const lx_luxel_page *page = lx_job_page(g->job, i, &texel);
+        answers[i] = map->valid[i] && lx_luxel_is_whole(g->bake, page, texel);
+    }
+    lx_lookup_invalidate(&g->lookup, &map->view, answers);
+    lx_free(answers);
+    return LX_OK;
+}
+
 // Bakes layers first … first + count - 1. `uses`: [source_count] room for their uses.
 static lx_result bake_group(lx_bake_job *job, uint32_t first, uint32_t count, lx_source_use *uses, sum_estimate *sums, double start, lx_error *error)
 {
@@ -689,7 +705,7 @@ static lx_result bake_group(lx_bake_job *job, uint32_t first, uint32_t count, lx
     find_authored(&g);
     choose_scales(&g);
     LX_TRY(lx_lookup_create(bake, &job->map.view, &g.lookup, error));
-    lx_lookup_invalidate(&g.lookup, &job->map.view, job->map.valid);
+    LX_TRY(choose_answers(&g, error));
     LX_TRY(create_scratch(&g, workers, samples < largest_round ? samples : largest_round, error));
     LX_TRY(lx_pool_run_weighted(pool, job->map.tile_count, job->tile_weights, light_tile, &g, "direct", job->progress, error));
     job->stages.direct += lx_lap(&stage_start);

@@ -104,8 +104,8 @@ void lx_lookup_release(lx_lookup *lookup)
     *lookup = (lx_lookup){0};
 }
 
-void lx_lookup_invalidate(lx_lookup *lookup, const lx_luxel_map *map, const uint8_t *valid)
+void lx_lookup_invalidate(lx_lookup *lookup, const lx_luxel_map *map, const uint8_t *answers)
 {
     for (uint32_t i = 0; i < map->count; ++i)
-        if (!valid[i]) lookup->places[map->texel[i]].luxel = LX_NO_LUXEL;
+        if (!answers[i]) lookup->places[map->texel[i]].luxel = LX_NO_LUXEL;
 }

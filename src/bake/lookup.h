@@ -65,7 +65,7 @@ static inline uint32_t lx_lookup_luxel(const lx_lookup *lookup, lx_taps taps)
     return holder.chart == taps.chart ? holder.luxel : LX_NO_LUXEL;
 }
 
-/// Light of luxels that are not valid is never looked up. `valid`: per luxel.
-void lx_lookup_invalidate(lx_lookup *lookup, const lx_luxel_map *map, const uint8_t *valid);
+/// Luxels whose `answers` is false are never looked up.
+void lx_lookup_invalidate(lx_lookup *lookup, const lx_luxel_map *map, const uint8_t *answers);
 
 #endif

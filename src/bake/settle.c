@@ -35,6 +35,7 @@ typedef struct company {
     float texel_m[lx_site_count];
     uint32_t surface[lx_site_count];
     uint32_t good, moved; // bit k: site k
+    bool split;           // the good ones lie in more than one room
 } company;
 
 // ---- what a place sees ------------------------------------------------------------------------------------------------------
@@ -294,7 +295,9 @@ static uint32_t choose_sites(company *c)
     uint32_t rooms;
     if (all_look_free(c)) {
         c->good = (1u << lx_site_count) - 1;
-        return largest_room(c, &rooms);
+        const uint32_t room = largest_room(c, &rooms);
+        c->split = rooms > 1;
+        return room;
     }
     for (uint32_t k = 0; k < lx_site_count; ++k)
         if (is_good(c, &c->sites[k], k)) c->good |= 1u << k;
@@ -304,6 +307,7 @@ static uint32_t choose_sites(company *c)
         move_sites(c, lx_site_count);
         room = largest_room(c, &rooms);
     }
+    c->split = rooms > 1;
     return room;
 }
 
@@ -339,6 +343,7 @@ static uint32_t settle_texel(lx_texel *t, lx_settled *out)
     if (chosen == 0) return LX_SITES_INVALID;
     if (chosen == (1u << lx_site_count) - 1 && !c.moved) return LX_SITES_PLAIN;
     replace_others(&c, chosen, out);
+    out->split = c.split;
     return 0;
 }
 

@@ -167,13 +167,25 @@ const lx_piece *lx_texel_site(lx_texel *t, uint32_t number, lx_receiver *out)
     return piece;
 }
 
+// NULL: all sites are where they fall, or there are none.
+static const lx_settled *settled_of(const lx_bake *bake, const lx_luxel_page *page, uint32_t texel)
+{
+    const uint32_t state = page->state[texel], size = bake->atlas->page_size, edge = (size + lx_site_block - 1) / lx_site_block;
+    if (state >= LX_SITES_INVALID) return NULL;
+    return &page->settled[texel / size / lx_site_block * edge + texel % size / lx_site_block][state];
+}
+
+bool lx_luxel_is_whole(const lx_bake *bake, const lx_luxel_page *page, uint32_t texel)
+{
+    const lx_settled *settled = settled_of(bake, page, texel);
+    return !settled || !settled->split;
+}
+
 void lx_luxel_sites(const lx_bake *bake, const lx_luxel_page *page, uint32_t texel, uint32_t first, uint32_t count, lx_receiver *out)
 {
     lx_texel t;
     lx_texel_open(&t, bake, page, texel);
-    const uint32_t state = page->state[texel], edge = (bake->atlas->page_size + lx_site_block - 1) / lx_site_block;
-    const lx_settled *settled = NULL;
-    if (state < LX_SITES_INVALID) settled = &page->settled[t.y / lx_site_block * edge + t.x / lx_site_block][state];
+    const lx_settled *settled = settled_of(bake, page, texel);
     for (uint32_t i = 0; i < count; ++i) {
         lx_texel_site(&t, settled ? settled->number[first + i] : first + i, &out[i]);
         if (settled) out[i].position = settled->position[first + i];
