@@ -32,7 +32,7 @@ enum {
     most_passes = 1000,
 };
 
-static const float near_texels = 2.0f, pass_near_texels = 1.0f;
+static const float near_texels = 1.0f, pass_near_texels = 1.0f;
 static const double enough_energy = 1e-3; // of a layer's: what later bounces may still have added
 static const float darkest = 0.01f;      // of a layer's mean: below it errors count as if the texel were that bright
 static const uint32_t cache_stream = 0x63616368;
