@@ -11,6 +11,7 @@
 
 #include "bake/finish.h"
 #include "bake/gather_rays.h"
+#include "bake/memory_plan.h"
 #include "bake/texel_sites.h"
 #include "base/clock.h"
 #include "base/error.h"
@@ -742,8 +743,11 @@ lx_result lx_bake_by_gathering(lx_bake_job *job, lx_error *error)
         result = lx_fail_memory(error, "layers");
         goto cleanup;
     }
+    lx_memory_plan plan;
+    LX_TRY(lx_memory_plan_make(job, &plan, error));
+    job->predicted_bytes = plan.peak_bytes;
     for (uint32_t first = 0; first < bake->layer_count; ++job->group_count) {
-        const uint32_t count = bake->layer_count - first;
+        const uint32_t count = lx_memory_group(bake, &plan, first);
         LX_TRY(bake_group(job, first, count, uses, sums, start, error));
         first += count;
     }

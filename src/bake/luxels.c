@@ -10,8 +10,7 @@ static const double least_area = 1e-4; // of a texel's square: thinner slivers w
 
 // ---- rasterisation -------------------------------------------------------------------------------------------------------
 
-// First number of each instance's charts on the pages: [instance_count], owned by the caller.
-static uint32_t *chart_bases(const lx_atlas *atlas)
+uint32_t *lx_chart_bases(const lx_atlas *atlas)
 {
     const lx_scene *scene = atlas->scene;
     uint32_t *bases = lx_calloc_array(scene->instance_count, sizeof *bases);
@@ -202,7 +201,7 @@ lx_result lx_luxels_rasterise(lx_bake *bake, uint32_t page, lx_luxel_page *out, 
     raw_fragments raw = {0};
     const uint32_t size = bake->atlas->page_size, edge = (size + lx_site_block - 1) / lx_site_block;
     *out = (lx_luxel_page){.number = page, .block_count = edge * edge};
-    uint32_t *bases = chart_bases(bake->atlas);
+    uint32_t *bases = lx_chart_bases(bake->atlas);
     if (!bases) return lx_fail_memory(error, "luxels");
     LX_TRY(cover_page(bake, page, bases, &raw, error));
     if (raw.count > UINT32_MAX) {

@@ -35,7 +35,7 @@ typedef struct company {
     float texel_m[lx_site_count];
     uint32_t surface[lx_site_count];
     uint32_t good, moved; // bit k: site k
-    bool split;           // the good ones lie in more than one room
+    bool split;           // the good ones lie in more than one room, or some of them under something low
 } company;
 
 // ---- what a place sees ------------------------------------------------------------------------------------------------------
@@ -108,6 +108,22 @@ static bool all_look_free(const company *c)
     for (uint32_t k = 0; k < lx_site_count; ++k)
         if (is_back(c->tracer, &rays[k], &hits[k])) return false;
     return true;
+}
+
+// Does something hang so low over some of the good sites, and not over others, that their mean says little of either?
+static bool is_half_covered(const company *c)
+{
+    lx_ray rays[lx_site_count];
+    lx_rgb passes[lx_site_count];
+    uint32_t count = 0, covered = 0;
+    for (uint32_t k = 0; k < lx_site_count; ++k) {
+        if (!(c->good >> k & 1)) continue;
+        const lx_receiver *r = &c->sites[k];
+        rays[count++] = (lx_ray){.origin = lx_offset_origin(r->position, r->geometric_normal), .direction = r->geometric_normal, .t_max = 0.5f * c->texel_m[k]};
+    }
+    lx_trace_transmittance(c->tracer, rays, passes, count);
+    for (uint32_t i = 0; i < count; ++i) covered += lx_rgb_is_black(passes[i]);
+    return covered > 0 && covered < count;
 }
 
 // ---- moving out -------------------------------------------------------------------------------------------------------------
@@ -319,7 +335,7 @@ static uint32_t choose_sites(company *c)
     if (all_look_free(c)) {
         c->good = (1u << lx_site_count) - 1;
         const uint32_t room = largest_room(c, &rooms);
-        c->split = rooms > 1;
+        c->split = rooms > 1 || is_half_covered(c);
         return room;
     }
     for (uint32_t k = 0; k < lx_site_count; ++k)
@@ -332,7 +348,7 @@ static uint32_t choose_sites(company *c)
         move_sites(c, lx_site_count);
         room = largest_room(c, &rooms);
     }
-    c->split = rooms > 1;
+    c->split = rooms > 1 || is_half_covered(c);
     return room;
 }
 
@@ -366,7 +382,7 @@ static uint32_t settle_texel(lx_texel *t, lx_settled *out)
     }
     const uint32_t chosen = choose_sites(&c);
     if (chosen == 0) return LX_SITES_INVALID;
-    if (chosen == (1u << lx_site_count) - 1 && !c.moved) return LX_SITES_PLAIN;
+    if (chosen == (1u << lx_site_count) - 1 && !c.moved && !c.split) return LX_SITES_PLAIN;
     replace_others(&c, chosen, out);
     out->split = c.split;
     return 0;
