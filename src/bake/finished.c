@@ -114,6 +114,11 @@ lx_result lx_finished_extend(lx_finished *f, const uint32_t *texels, uint32_t co
     return LX_OK;
 }
 
+const uint32_t *lx_finished_entries(const lx_finished *finished)
+{
+    return finished->entry;
+}
+
 uint32_t lx_finished_count(const lx_finished *f)
 {
     return f->luxel_count + f->extra_count;

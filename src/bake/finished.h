@@ -25,6 +25,9 @@ void lx_finished_destroy(lx_finished *finished);
 lx_result lx_finished_dilate(lx_finished *finished, const lx_luxel_map *map, uint32_t page, uint32_t padding, uint32_t *page_chart,
                              lx_error *error);
 
+/// [page_count * page_size²] the luxel whose colour each texel shows, or UINT32_MAX. Borrowed; valid until lx_finished_extend. For lx_stitch_create.
+const uint32_t *lx_finished_entries(const lx_finished *finished);
+
 /// Gives texels that are no luxels (page * page_size² + y * page_size + x, ascending) a colour of their own: entries lx_luxel_map.count and up, in
 /// this order. Once, after all pages were dilated and before such an entry is written.
 lx_result lx_finished_extend(lx_finished *finished, const uint32_t *texels, uint32_t count, lx_error *error);

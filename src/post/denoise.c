@@ -12,13 +12,15 @@ enum {
 };
 
 // Differences of so many standard deviations halve a weight.
-static const float tolerance = 2.0f;
+static const float tolerance = 3.0f;
 // Below the first relative standard error a luxel counts as clean and stays, above the second nothing holds the filter back.
 static const float clean_error = 0.003f, noisy_error = 0.008f;
 // Variances come from samples that are spread better than chance within each half; what they say of the whole is on the high side. So much
 // of it counts where the filter is compared with the input.
 static const float trusted_variance = 0.85f;
 
+// By how much the variance beside a bright spot may exceed what the value suggests; and the share of a luxel's own variance that counts at least.
+static const float contrast = 6, own_share = 0.25f;
 static const float unsure = 0.05f; // relative variance at which a luxel's own value and its neighbourhood's count alike
 static const float most_error = 16; // in variances: one luxel must not decide for its neighbourhood
 
@@ -69,7 +71,7 @@ static work lay_out(const lx_denoise_graph *graph, void *scratch)
 
 // Variances of single luxels, from a few half buffers each, are mostly noise themselves. Means over the neighbourhood: of the variance, of its share of
 // the squared value, and of the value. Beside a bright spot the first is far too high for the dark, beside a dark spot the second for the
-// bright; the lower of what they say is near the truth in both.
+// bright; the lower of what they say is not far from the truth in both.
 typedef struct spread {
     float absolute, relative, value;
 } spread;
@@ -106,7 +108,8 @@ static void smooth_variances(const work *w, const lx_estimate *in)
         // Where the noise is strong a single value says little about the light; the neighbourhood's does.
         const float shared = a[i].relative * a[i].relative / (a[i].relative * a[i].relative + unsure * unsure);
         const float value = (1 - shared) * mean_of(in[i].mean) + shared * a[i].value;
-        w->levels[0][i] = (lx_estimate){in[i].mean, lx_min(a[i].absolute, a[i].relative * value * value)};
+        const float smooth = lx_min(a[i].absolute, contrast * a[i].relative * value * value);
+        w->levels[0][i] = (lx_estimate){in[i].mean, lx_max(smooth, own_share * in[i].variance)}; // an outlier knows that it is one
     }
 }
 

@@ -150,11 +150,13 @@ static bool sample_area(const lx_light *light, const lx_receiver *r, lx_vec2 u, 
 static bool sample_emissive(const lx_tracer *tracer, uint32_t source, const lx_receiver *r, lx_vec2 u, uint32_t count, lx_ray *ray,
                             lx_rgb *irradiance, uint32_t *cell)
 {
+    // Seen from where rays start, so that hits are weighed by the same densities.
+    const lx_vec3 origin = ray_origin(r);
     lx_emitter_sample s;
-    if (!lx_emitters_sample(&tracer->emitters, source, u, &s)) return false;
+    if (!lx_emitters_sample(&tracer->emitters, source, origin, u, &s)) return false;
     const lx_emitter_triangle *t = s.triangle;
     const lx_vec3 point = lx_mad(lx_mad(t->origin, t->edge1, s.u), t->edge2, s.v);
-    const lx_vec3 to_point = lx_sub(point, r->position);
+    const lx_vec3 to_point = lx_sub(point, origin);
     lx_vec3 normal = t->normal;
     if (t->double_sided && lx_dot(normal, to_point) > 0) normal = lx_neg(normal);
     const float facing = -lx_dot(normal, to_point);
@@ -233,7 +235,7 @@ bool lx_sample_source(const lx_tracer *tracer, uint32_t source, const lx_receive
 float lx_hit_weight(const lx_tracer *tracer, const lx_ray *ray, const lx_hit *hit, lx_vec3 hit_normal, float cosine, uint32_t count)
 {
     const uint32_t index = tracer->surfaces[hit->surface].first_emitter_triangle + hit->triangle;
-    const float pdf_area = lx_emitters_pdf_area(&tracer->emitters, index, hit->u, hit->v);
+    const float pdf_area = lx_emitters_pdf_area(&tracer->emitters, index, ray->origin, hit->u, hit->v);
     const float emitter_cosine = fabsf(lx_dot(hit_normal, ray->direction)); // directions of such rays are unit
     const float pdf = emitter_cosine > 0 ? pdf_area * hit->t * hit->t / emitter_cosine : 0;
     return power_heuristic(cosine / LX_PI, (float)count * pdf);
