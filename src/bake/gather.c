@@ -688,8 +688,8 @@ static lx_result choose_answers(gather_job *g, lx_error *error)
 }
 
 // Bakes layers first … first + count - 1. `uses`: [source_count] room for their uses.
-static lx_result bake_group(lx_bake_job *job, uint32_t first, uint32_t count, lx_source_use *uses, sum_estimate *sums, double deadline,
-                            lx_error *error)
+static lx_result bake_group(lx_bake_job *job, uint32_t first, uint32_t count, lx_source_use *uses, sum_estimate *sums, lx_finish *finish,
+                            double deadline, lx_error *error)
 {
     lx_result result = LX_OK;
     lx_bake *bake = job->bake;
@@ -729,7 +729,7 @@ static lx_result bake_group(lx_bake_job *job, uint32_t first, uint32_t count, lx
     job->stages.gather += lx_lap(&stage_start);
     add_to_sums(&g);
     release_cache(&g, workers);
-    LX_TRY(lx_bake_finish_layers(job, g.direct, g.indirect, first, count, error));
+    LX_TRY(lx_finish_layers(finish, g.direct, g.indirect, first, count, error));
     job->stages.denoise += lx_lap(&stage_start);
 cleanup:
     release_cache(&g, workers);
@@ -744,6 +744,7 @@ lx_result lx_bake_by_gathering(lx_bake_job *job, lx_error *error)
     lx_bake *bake = job->bake;
     lx_source_use *uses = lx_calloc_array(bake->source_count, sizeof *uses);
     sum_estimate *sums = lx_calloc_array(job->map.view.count, sizeof *sums);
+    lx_finish *finish = NULL;
     if (!uses || !sums) {
         result = lx_fail_memory(error, "layers");
         goto cleanup;
@@ -751,14 +752,16 @@ lx_result lx_bake_by_gathering(lx_bake_job *job, lx_error *error)
     lx_memory_plan plan;
     LX_TRY(lx_memory_plan_make(job, &plan, error));
     job->predicted_bytes = plan.peak_bytes;
+    LX_TRY(lx_finish_open(job, &finish, error));
     for (uint32_t first = 0; first < bake->layer_count; ++job->group_count) {
         const uint32_t count = lx_memory_group(bake, &plan, first);
         const double share = (double)(first + count) / bake->layer_count; // of the time that all groups have
-        LX_TRY(bake_group(job, first, count, uses, sums, start + share * bake->desc.time_s, error));
+        LX_TRY(bake_group(job, first, count, uses, sums, finish, start + share * bake->desc.time_s, error));
         first += count;
     }
     job->noise = estimate_noise(job, sums);
 cleanup:
+    lx_finish_close(finish);
     lx_free(uses);
     lx_free(sums);
     return result;
