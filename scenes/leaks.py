@@ -24,7 +24,7 @@ def _camera(scene, name, eye, target, yfov=70):
     scene.add_node(name, camera=scene.add_camera(name, yfov), translation=eye, rotation=look(eye, target))
 
 
-def _ground(scene, material, size=12.0, below=-0.1):
+def _ground(scene, material, size=12.0, below=-0.07):
     ground = quad(size, size).rotate((1, 0, 0), -90).translate(0, below, 0)
     scene.add_node("ground", mesh=scene.add_mesh("ground", (ground, material)), extras={"luxel_density": 0.3})
 
@@ -69,22 +69,30 @@ def dark_room_of_sheets():
     return scene
 
 
-def thin_walls():
-    """Two closed rooms side by side, 2 cm of wall between them, which stands on one floor that both share; a lamp in the one, the other is dark.
-    No sun."""
+def _two_rooms(split, ceiling=True):
     scene = Gltf()
     white = scene.add_material("white", base_color=(0.8, 0.8, 0.8))
-    (x0, y0, z0), (x1, y1, z1), w, t = (-2.03, 0.0, -1.41), (1.93, 2.5, 1.52), 0.3, 0.02
-    shell = {
+    (x0, y0, z0), (x1, y1, z1), w, t, middle = (-2.03, 0.0, -1.41), (1.93, 2.5, 1.52), 0.3, 0.02, 0.013
+    across = {
         "floor": ((x0 - w, y0 - w, z0 - w), (x1 + w, y0, z1 + w)),
         "ceiling": ((x0 - w, y1, z0 - w), (x1 + w, y1 + w, z1 + w)),
-        "west": ((x0 - w, y0 - w, z0 - w), (x0, y1 + w, z1 + w)),
-        "east": ((x1, y0 - w, z0 - w), (x1 + w, y1 + w, z1 + w)),
         "north": ((x0 - w, y0 - w, z0 - w), (x1 + w, y1 + w, z0)),
         "south": ((x0 - w, y0 - w, z1), (x1 + w, y1 + w, z1 + w)),
-        "wall": ((0.013, y0 - 0.1, z0 - 0.1), (0.013 + t, y1 + 0.1, z1 + 0.1)),
     }
-    for name, (lo, hi) in shell.items():
+    solids = {
+        "west": ((x0 - w, y0 - w, z0 - w), (x0, y1 + w, z1 + w)),
+        "east": ((x1, y0 - w, z0 - w), (x1 + w, y1 + w, z1 + w)),
+        "wall": ((middle - t / 2, y0 - 0.1, z0 - 0.1), (middle + t / 2, y1 + 0.1, z1 + 0.1)),
+    }
+    if not ceiling:
+        del across["ceiling"]
+    for name, (lo, hi) in across.items():
+        if split:
+            solids[name + " 1"] = (lo, (middle, hi[1], hi[2]))
+            solids[name + " 2"] = ((middle, lo[1], lo[2]), hi)
+        else:
+            solids[name] = (lo, hi)
+    for name, (lo, hi) in solids.items():
         scene.add_node(name, mesh=scene.add_mesh(name, (box_between(lo, hi), white)))
     lamp = scene.add_light("point", 100, name="lamp")
     scene.add_node("lamp", light=lamp, translation=(-1.0, 1.9, 0.1))
@@ -93,9 +101,49 @@ def thin_walls():
     return scene
 
 
-def intersecting_boxes():
+def thin_wall():
+    """Two closed rooms with 2 cm of wall between them, a lamp in the one.  Each has a floor, a ceiling and outer walls of its own, which meet under the wall."""
+    return _two_rooms(True)
+
+
+def thin_wall_on_one_floor():
+    """The same, but floor, ceiling and outer walls run through: their charts belong to both rooms."""
+    return _two_rooms(False)
+
+
+def thin_wall_from_above():
+    """The same without a ceiling and with a blue lamp in the other room; nothing that could throw light back is higher than the wall."""
+    scene = _two_rooms(False, ceiling=False)
+    blue = scene.add_light("point", 100, name="blue lamp", color=(0.05, 0.2, 1))
+    scene.add_node("blue lamp", light=blue, translation=(1.1, 1.5, 0.3))
+    scene.json["extensions"]["KHR_lights_punctual"]["lights"][0]["color"] = [1, 0.25, 0.05]
+    _camera(scene, "above", (0.3, 7.6, 1.5), (-0.05, 1.3, 0.1), 42)
+    return scene
+
+
+def close_charts(page=64, gap=2.02):
+    """A file's own lightmap set whose charts are `gap` texels of a page of `page` apart, at all phases against its texels.  Every second one faces the sun,
+    the others face down and are dark."""
+    scene, white = _scene((0, -1, 0))
+    strips, u, width, k = [], 2.3, 3.37, 0
+    while u + width < page - 2:
+        strip = quad(0.2, 2.0).rotate((1, 0, 0), -90 if k % 2 else 90).translate(0.3 * k, 0, 0)
+        strip.uv1 = [(x / page, y) for x, y in ((u, 0.9), (u + width, 0.9), (u + width, 0.1), (u, 0.1))]
+        strips.append(strip)
+        u, k = u + width + gap, k + 1
+    for k, strip in enumerate(strips):
+        scene.add_node("strip %d" % k, mesh=scene.add_mesh("strip %d" % k, (strip, white)))
+    _camera(scene, "below", (0.15 * len(strips), -2, 0.0), (0.15 * len(strips), 0, -0.001), 80)
+    _camera(scene, "above", (0.15 * len(strips), 2, 0.0), (0.15 * len(strips), 0, -0.001), 80)
+    return scene
+
+
+def intersecting_boxes(sun=True):
     """Three boxes on a floor, two that overlap and one that touches both."""
     scene, white = _scene()
+    if not sun:
+        scene = Gltf()
+        white = scene.add_material("white", base_color=(0.8, 0.8, 0.8))
     _ground(scene, white, 4.0, 0.0)
     boxes = {
         "tall": box(0.9, 1.7, 0.8, (0.03, 0.75, 0.02)),
@@ -128,7 +176,8 @@ def column():
     return scene
 
 
-SCENES = {f.__name__: f for f in (dark_room_of_boxes, dark_room_of_sheets, thin_walls, intersecting_boxes, column)}
+SCENES = {f.__name__: f for f in (dark_room_of_boxes, dark_room_of_sheets, thin_wall, thin_wall_on_one_floor, thin_wall_from_above,
+                                close_charts, intersecting_boxes, column)}
 
 
 if __name__ == "__main__":

@@ -35,12 +35,10 @@ static lx_result compose(const lx_baked *baked, uint32_t page, uint32_t level, u
 {
     float *rgb = lx_malloc_array((size_t)size * size, 3 * sizeof *rgb);
     if (!rgb) return lx_fail_memory(error, "report");
-    const lxrt_region region = {.page = page, .level = level, .width = size, .height = size};
-    const lxrt_target target = {.texels = rgb, .format = LXRT_FORMAT_RGB32F, .scale = 1};
-    const lxrt_result rt = lxrt_compose(baked->pack, &region, &target);
-    if (rt != LXRT_OK) {
+    const lx_result result = lx_baked_compose_level(baked, page, level, rgb, error);
+    if (result != LX_OK) {
         lx_free(rgb);
-        return lx_fail(error, LX_ERROR_BACKEND, "report: page %u: %s", page, lxrt_result_name(rt));
+        return result;
     }
     *out = rgb;
     return LX_OK;
@@ -123,6 +121,7 @@ lx_result lx_report_seen_picture(const lx_baked *baked, const lx_seen *seen, lx_
     float *rgb = lx_malloc_array((size_t)seen->width * seen->height, 3 * sizeof *rgb);
     if (!rgb) return lx_fail_memory(error, "report");
     lx_seen_light(seen, baked, rgb);
+    lx_baked_rest(baked);
     const lx_result result = develop(rgb, seen->width, seen->height, out, out_black, error);
     lx_free(rgb);
     return result;
@@ -134,7 +133,7 @@ lx_result lx_report_brightest_page(const lx_baked *baked, uint32_t *out_page, lx
     const uint32_t page_count = lx_baked_page_count(baked);
     *out_page = 0;
     for (uint32_t page = 0; page_count > 1 && page < page_count; ++page) {
-        float *rgb;
+        float *rgb = NULL;
         uint32_t size;
         const uint32_t level = choose_level(baked, 1, &size);
         const lx_result result = compose(baked, page, level, size, &rgb, error);

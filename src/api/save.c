@@ -118,7 +118,7 @@ static lx_result write_from_folder(lx_bake *bake, const lx_save_desc *desc, cons
     lx_image picture = {0};
     const double start = lx_seconds();
     LX_TRY(create_silent_context(bake->scene->context, &context, error));
-    LX_TRY(lx_baked_open(context, folder->partial, desc->preview, &baked, error));
+    LX_TRY(lx_baked_open_mapped(context, folder->partial, desc->preview, &baked, error));
     lx_baked_get_budget(baked, &manifest->memory);
     bake->summary.budget = manifest->memory;
     if (desc->preview) {

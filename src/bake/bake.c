@@ -31,7 +31,7 @@ static lx_result create_finished(lx_bake *bake, const lx_luxel_map *map, lx_erro
 {
     lx_finished_destroy(bake->finished);
     bake->finished = NULL;
-    return lx_finished_create(map, bake->layer_count, false, NULL, &bake->finished, error);
+    return lx_finished_create(map, bake->layer_count, bake->desc.memory_bytes > 0, bake->desc.scratch_folder, &bake->finished, error);
 }
 
 static lx_result check_desc(const lx_bake_desc *desc, lx_error *error)
@@ -90,6 +90,7 @@ lx_result lx_bake_create(const lx_scene *scene, const lx_atlas *atlas, const lx_
     memset(bake->texel_chart, 0xff, texel_count * sizeof *bake->texel_chart); // LX_NO_CHART
     const lx_luxel_map none = {.page_size = atlas->page_size, .page_count = atlas->page_count};
     LX_TRY(create_finished(bake, &none, error)); // a bake that never ran is black
+    bake->created_bytes = lx_resident_memory();
     *out_bake = bake;
     bake = NULL;
 cleanup:
@@ -187,7 +188,7 @@ static void summarise(const lx_bake_job *job, double start)
     *s = (lx_bake_summary){.page_count = bake->atlas->page_count, .page_size = bake->atlas->page_size,
                            .layer_count = bake->layer_count, .source_count = bake->source_count, .texel_count = map->count,
                            .texels_per_m = bake->atlas->texels_per_m, .stages = job->stages, .ray_count = job->ray_count,
-                           .noise = job->noise, .group_count = job->group_count};
+                           .noise = job->noise, .group_count = job->group_count, .predicted_bytes = job->predicted_bytes};
     for (uint32_t i = 0; i < map->count; ++i) s->invalid_count += !map->valid[i];
     const double total = (double)map->page_size * map->page_size * map->page_count;
     s->coverage = total > 0 ? (float)((double)s->texel_count / total) : 0;
@@ -242,14 +243,13 @@ lx_result lx_bake_run(lx_bake *bake, const lx_progress_sink *progress, lx_error 
     if (!job.pages) return lx_fail_memory(error, "luxels");
     lx_advise_on_scene(bake);
     LX_TRY(place_luxels(&job, error));
+    LX_TRY(lx_pool_run(pool, atlas->page_count, fill_page, &job, "luxels", progress, error));
     job.stages.luxels = lx_lap(&stage_start);
     if (bake->desc.integrator == LX_INTEGRATOR_PATH)
         LX_TRY(lx_bake_by_paths(&job, error));
     else
         LX_TRY(lx_bake_by_gathering(&job, error));
     job.stages.bake = lx_lap(&stage_start);
-    LX_TRY(lx_pool_run(pool, atlas->page_count, fill_page, &job, "post", progress, error));
-    job.stages.post = lx_lap(&stage_start);
     summarise(&job, start);
     LX_TRY(check_sum_of_layers(&job, error));
     LX_TRY(lx_advise_on_layers(bake, error));

@@ -41,6 +41,7 @@ struct lx_bake {
     uint8_t *texel_coverage;
     lx_finished *finished; ///< T of every layer, black until lx_bake_run. Unit light: lux per cd, lx or nt (for `combined`: lux).
 
+    uint64_t created_bytes; ///< Resident size of the process when the bake was created.
     lx_bake_summary summary;
 };
 

@@ -15,6 +15,7 @@ typedef struct lx_bake_job {
     uint64_t ray_count;
     float noise;           ///< As in lx_bake_summary.
     uint32_t group_count;
+    uint64_t predicted_bytes; ///< Likewise.
 } lx_bake_job;
 
 /// Both fill the light of all luxels and layers.

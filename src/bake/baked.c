@@ -63,14 +63,27 @@ static lx_result check_pack(const lx_baked *baked, lx_error *error)
     return fits ? LX_OK : lx_fail(error, LX_ERROR_FORMAT, "does not fit " LX_MANIFEST_NAME ": pages or layers differ");
 }
 
-static lx_result open_pack(lx_baked *baked, lx_error *error)
+// Of a mapped pack a part at a time.
+static uint64_t hash_pack(const lx_baked *baked, const lx_bytes *data)
+{
+    enum { part_bytes = 4 << 20 };
+    uint64_t hash = LX_CONTENT_HASH_START;
+    for (size_t at = 0; at < data->size; at += part_bytes) {
+        const size_t left = data->size - at;
+        hash = lx_content_hash_add(hash, data->data + at, left < part_bytes ? left : part_bytes);
+        lx_baked_rest(baked);
+    }
+    return lx_content_hash_end(hash);
+}
+
+static lx_result open_pack(lx_baked *baked, bool mapped, lx_error *error)
 {
     lx_result result = LX_OK;
     char *path = NULL;
     LX_TRY(path_inside(baked, baked->manifest.pack, &path, error));
-    result = lx_file_read(path, max_pack_bytes, &baked->pack_data, error);
+    result = mapped ? lx_file_map_open(path, &baked->pack_map, error) : lx_file_read(path, max_pack_bytes, &baked->pack_data, error);
     if (result == LX_OK) {
-        const lx_bytes *data = &baked->pack_data;
+        const lx_bytes view = {(uint8_t *)baked->pack_map.data, baked->pack_map.size}, *data = mapped ? &view : &baked->pack_data;
         size_t needed = 0;
         lxrt_result rt = lxrt_memory_bytes(data->data, data->size, &needed);
         if (rt == LXRT_OK) {
@@ -81,7 +94,7 @@ static lx_result open_pack(lx_baked *baked, lx_error *error)
             result = lx_fail(error, rt == LXRT_ERROR_VERSION ? LX_ERROR_UNSUPPORTED : LX_ERROR_FORMAT, "%s", lxrt_result_name(rt));
         else if (!baked->pack_memory)
             result = lx_fail_memory(error, "pack");
-        else if (baked->manifest.pack_hash && lx_content_hash(data->data, data->size) != baked->manifest.pack_hash)
+        else if (baked->manifest.pack_hash && hash_pack(baked, data) != baked->manifest.pack_hash)
             result = lx_fail(error, LX_ERROR_FORMAT, "is not the file that " LX_MANIFEST_NAME " was written for (hashes differ)");
         else
             result = check_pack(baked, error);
@@ -236,7 +249,7 @@ cleanup:
     return result;
 }
 
-lx_result lx_baked_open(lx_context *context, const char *folder, bool with_scene, lx_baked **out_baked, lx_error *error)
+static lx_result open_folder(lx_context *context, const char *folder, bool with_scene, bool mapped, lx_baked **out_baked, lx_error *error)
 {
     lx_result result = LX_OK;
     lx_baked *baked = lx_calloc_array(1, sizeof *baked);
@@ -253,13 +266,28 @@ lx_result lx_baked_open(lx_context *context, const char *folder, bool with_scene
         goto cleanup;
     }
     LX_TRY(open_manifest(baked, error));
-    LX_TRY(open_pack(baked, error));
+    LX_TRY(open_pack(baked, mapped, error));
     if (with_scene) LX_TRY(open_scene(baked, error));
     *out_baked = baked;
     baked = NULL;
 cleanup:
     lx_baked_destroy(baked);
     return result;
+}
+
+lx_result lx_baked_open(lx_context *context, const char *folder, bool with_scene, lx_baked **out_baked, lx_error *error)
+{
+    return open_folder(context, folder, with_scene, false, out_baked, error);
+}
+
+lx_result lx_baked_open_mapped(lx_context *context, const char *folder, bool with_scene, lx_baked **out_baked, lx_error *error)
+{
+    return open_folder(context, folder, with_scene, true, out_baked, error);
+}
+
+void lx_baked_rest(const lx_baked *baked)
+{
+    lx_file_map_rest(&baked->pack_map);
 }
 
 void lx_baked_destroy(lx_baked *baked)
@@ -271,6 +299,7 @@ void lx_baked_destroy(lx_baked *baked)
     lx_free(baked->sky_path);
     lx_free(baked->pack_memory);
     lx_bytes_release(&baked->pack_data);
+    lx_file_map_release(&baked->pack_map);
     lx_manifest_release(&baked->manifest);
     lx_free(baked->folder);
     lx_free(baked);
@@ -348,16 +377,27 @@ bool lx_baked_monitor_shows_cells(const lx_baked *baked, const lx_manifest_monit
     return false;
 }
 
+// A mapped pack in rows of blocks, so that no more of it is in memory than they need.
+lx_result lx_baked_compose_level(const lx_baked *baked, uint32_t page, uint32_t level, float *out_rgb, lx_error *error)
+{
+    enum { block_edge = 32 };
+    const uint32_t size = lx_baked_page_size(baked) >> level, rows = baked->pack_map.data ? block_edge : size;
+    for (uint32_t y = 0; y < size; y += rows) {
+        const lxrt_region region = {.page = page, .level = level, .y = y, .width = size, .height = size - y < rows ? size - y : rows};
+        const lxrt_target target = {.texels = out_rgb + 3 * (size_t)y * size, .format = LXRT_FORMAT_RGB32F, .scale = 1};
+        const lxrt_result rt = lxrt_compose(baked->pack, &region, &target);
+        if (rt != LXRT_OK) return lx_fail(error, LX_ERROR_BACKEND, "%s: page %u: %s", baked->folder, page, lxrt_result_name(rt));
+        lx_baked_rest(baked);
+    }
+    return LX_OK;
+}
+
 lx_result lx_baked_compose(const lx_baked *baked, uint32_t page, float *out_rgb, lx_error *error)
 {
-    const uint32_t size = lx_baked_page_size(baked);
     if (page >= baked->manifest.page_count)
         return lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "%s: there is no page %u; it has %u", baked->folder, page,
                        baked->manifest.page_count);
-    const lxrt_region region = {.page = page, .width = size, .height = size};
-    const lxrt_target target = {.texels = out_rgb, .format = LXRT_FORMAT_RGB32F, .scale = 1};
-    const lxrt_result rt = lxrt_compose(baked->pack, &region, &target);
-    return rt == LXRT_OK ? LX_OK : lx_fail(error, LX_ERROR_BACKEND, "%s: page %u: %s", baked->folder, page, lxrt_result_name(rt));
+    return lx_baked_compose_level(baked, page, 0, out_rgb, error);
 }
 
 void lx_baked_get_budget(const lx_baked *baked, lx_budget *out)

@@ -12,7 +12,8 @@ struct lx_baked {
     lx_context *context; ///< Borrowed.
     char *folder;
     lx_manifest manifest;
-    lx_bytes pack_data;
+    lx_bytes pack_data;   ///< luxel.pack, unless it is
+    lx_file_map pack_map; ///< mapped.
     void *pack_memory;
     lxrt_pack *pack; ///< In pack_memory; holds the current colours.
 
@@ -26,6 +27,13 @@ struct lx_baked {
     lx_source_use *uses;
     uint32_t use_count; ///< scene->source_count + 1; the last is the sky's, whether there is one or not.
 };
+
+/// Opens a folder of our own without reading luxel.pack into memory: it stays on disk but for what is just used, see lx_baked_rest.
+lx_result lx_baked_open_mapped(lx_context *context, const char *folder, bool with_scene, lx_baked **out_baked, lx_error *error);
+/// Forgets what was read of a mapped pack; a few milliseconds where it is read again, nothing to others.
+void lx_baked_rest(const lx_baked *baked);
+/// A whole mip level of a page at current colours: [(page size >> level)²] RGB.
+lx_result lx_baked_compose_level(const lx_baked *baked, uint32_t page, uint32_t level, float *out_rgb, lx_error *error);
 
 /// Current colour × intensity of a source, in its unit: what an emitter's texture or a sky's picture is multiplied by. 0 for sources
 /// that are not in the bake. `index`: as in uses.

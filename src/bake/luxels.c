@@ -134,7 +134,7 @@ cleanup:
     return result;
 }
 
-// ---- gaps of one texel between charts --------------------------------------------------------------------------------------
+// ---- gaps between charts ----------------------------------------------------------------------------------------------------
 
 // How much bilinear filtering of the surface within texel `neighbour` reads the texel (x, y) beside it.
 static double need_of(const lx_bake *bake, const lx_luxel_page *page, uint32_t neighbour, uint32_t x, uint32_t y)
@@ -156,8 +156,8 @@ static double need_of(const lx_bake *bake, const lx_luxel_page *page, uint32_t n
     return sum;
 }
 
-// An empty texel that touches several charts goes to the one whose surface is filtered with it most. Dilation knows whole texels only: where files bring
-// charts that are a texel apart, it would give every second gap to the chart that has no use for it, and its light would show in the other.
+// An empty texel goes to the chart whose surface is filtered with it, if there are several to the one that reads it most. Charts that are two texels apart then never
+// show each other's light. Dilation, which has the rest, knows whole texels only: it would give a gap of one texel to either chart, whichever needs it.
 static void claim_gap(lx_bake *bake, const lx_luxel_page *page, uint32_t x, uint32_t y)
 {
     const uint32_t size = bake->atlas->page_size;
@@ -178,7 +178,7 @@ static void claim_gap(lx_bake *bake, const lx_luxel_page *page, uint32_t x, uint
             }
             need[i] += need_of(bake, page, neighbour, x, y);
         }
-    if (count < 2) return;
+    if (count == 0) return;
     uint32_t best = 0;
     for (uint32_t i = 1; i < count; ++i)
         if (need[i] > need[best] || (need[i] == need[best] && chart[i] < chart[best])) best = i;

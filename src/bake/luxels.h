@@ -22,7 +22,7 @@ typedef struct lx_fragment {
 typedef struct lx_settled {
     lx_vec3 position[lx_site_count];
     uint8_t number[lx_site_count];
-    bool split; ///< Some of the texel lies in another room: its light is that of one of them alone.
+    bool split; ///< Some of the texel lies in another room, or under something low: its light is not that of every place on it.
 } lx_settled;
 
 /// First number of each instance's charts in lx_bake.texel_chart: [instance_count], owned by the caller; NULL: no memory.
@@ -42,7 +42,7 @@ typedef struct lx_luxel_page {
 #define LX_SITES_INVALID 0xfffeu
 
 /// Conservative rasterisation of page `page`: fills `out`, and bake->texel_chart and bake->texel_coverage of that page.
-/// Where two charts touch one texel the larger share wins; an empty texel between two charts goes to the one whose bilinear filtering reads it most (in
+/// Where two charts touch one texel the larger share wins; an empty texel beside charts goes to the one whose bilinear filtering reads it most (in
 /// texel_chart alone; its coverage stays 0).
 lx_result lx_luxels_rasterise(lx_bake *bake, uint32_t page, lx_luxel_page *out, lx_error *error);
 void lx_luxels_release(lx_luxel_page *page);
@@ -60,7 +60,7 @@ static inline bool lx_luxel_is_valid(const lx_luxel_page *page, uint32_t texel)
     return page->state[texel] != LX_SITES_INVALID;
 }
 
-/// False where the texel reaches into more than one room: what is hit there may be lit quite differently from the texel's sites.
+/// False where the texel reaches into more than one room, or half under something: what is hit there may be lit quite differently from the texel's sites.
 bool lx_luxel_is_whole(const lx_bake *bake, const lx_luxel_page *page, uint32_t texel);
 
 /// Key of a texel's random streams, from the seed, its page and its number there.

@@ -273,7 +273,7 @@ static void list_rects(const lx_bake *bake, pack_tables *tables)
 
 // `ranges`: [layer_count].
 static lx_result begin_pack(const lx_bake *bake, const lx_manifest *manifest, const lx_layer_range *ranges, uint32_t level_count,
-                            lx_pack_writer **out, lx_error *error)
+                            const char *path, lx_pack_writer **out, lx_error *error)
 {
     pack_tables tables = {
         .layers = lx_calloc_array(bake->layer_count, sizeof *tables.layers),
@@ -324,23 +324,21 @@ static lx_result begin_pack(const lx_bake *bake, const lx_manifest *manifest, co
         .animations = bake->animations ? bake->animations->items : NULL,
         .animation_count = bake->animations ? (uint32_t)bake->animations->count : 0,
     };
-    LX_TRY(lx_pack_begin(&desc, out, error));
+    LX_TRY(lx_pack_begin_file(&desc, path, out, error));
 cleanup:
     pack_tables_release(&tables);
     return result;
 }
 
-static lx_result finish_pack(lx_bake *bake, lx_pack_writer *pack, const lx_new_folder *folder, lx_manifest *manifest, lx_error *error)
+static lx_result finish_pack(lx_bake *bake, lx_pack_writer *pack, lx_manifest *manifest, lx_error *error)
 {
-    lx_bytes bytes = {0};
-    lx_result result = lx_pack_finish(pack, &bytes, NULL, error);
-    if (result == LX_OK) {
-        bake->summary.pack_bytes = bytes.size;
-        manifest->pack_hash = lx_content_hash(bytes.data, bytes.size);
-        result = lx_new_folder_write(folder, pack_name, bytes.data, bytes.size, error);
-    }
-    lx_bytes_release(&bytes);
-    return result;
+    lx_bytes none = {0};
+    lx_pack_stats stats;
+    const lx_result result = lx_pack_finish(pack, &none, &stats, error);
+    if (result != LX_OK) return result;
+    bake->summary.pack_bytes = stats.bytes;
+    manifest->pack_hash = stats.hash;
+    return LX_OK;
 }
 
 // ---- all of it
@@ -381,7 +379,8 @@ lx_result lx_bake_write(lx_bake *bake, const lx_save_desc *desc, const lx_new_fo
     lx_layer_range *ranges = lx_calloc_array(bake->layer_count, sizeof *ranges);
     float *scales = lx_calloc_array(bake->layer_count, sizeof *scales);
     save_progress steps = {progress, lx_seconds(), 0, (uint64_t)bake->atlas->page_count * bake->layer_count + 2};
-    if (!ranges || !scales) {
+    char *pack_path = lx_path_join(folder->partial, pack_name);
+    if (!ranges || !scales || !pack_path) {
         result = lx_fail_memory(error, "layers");
         goto cleanup;
     }
@@ -394,11 +393,15 @@ lx_result lx_bake_write(lx_bake *bake, const lx_save_desc *desc, const lx_new_fo
         scales[i] = ktx2_scale(ranges[i].largest);
         if (desc->formats & LX_LIGHTMAP_KTX2) manifest.layers[i].scale = scales[i];
     }
-    LX_TRY(begin_pack(bake, &manifest, ranges, level_count, &pack, error));
+    result = begin_pack(bake, &manifest, ranges, level_count, pack_path, &pack, error);
+    if (result != LX_OK) {
+        lx_error_prefix(error, "%s", pack_path);
+        goto cleanup;
+    }
     LX_TRY(lx_lightmap_writer_create(bake, desc, scales, folder, &manifest, &lightmaps, error));
     for (uint32_t page = 0; page < bake->atlas->page_count; ++page)
         LX_TRY(write_page(bake, page, level_count, pack, lightmaps, &steps, error));
-    LX_TRY(finish_pack(bake, pack, folder, &manifest, error));
+    LX_TRY(finish_pack(bake, pack, &manifest, error));
     LX_TRY(advance(&steps, error));
     *out_manifest = manifest;
     manifest = (lx_manifest){0};
@@ -406,6 +409,7 @@ cleanup:
     lx_lightmap_writer_destroy(lightmaps);
     lx_pack_destroy(pack);
     lx_manifest_release(&manifest);
+    lx_free(pack_path);
     lx_free(ranges);
     lx_free(scales);
     return result;

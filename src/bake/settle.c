@@ -13,7 +13,7 @@
 enum {
     first_looks = 4,     // rays that tell most places, in the open or inside,
     all_looks = 16,      // and those that decide for the rest:
-    most_backs = 4,      // of all_looks. More: the place is inside something
+    most_backs = 4,      // one in so many. More: the place is inside something
     enough_sites = 4,    // good ones that lie where they fell: no need to move others
     most_failures = 3,   // to move a site: the others would not fare better
     most_pieces = 6,     // texels of more triangles are looked at site by site
@@ -35,7 +35,7 @@ typedef struct company {
     float texel_m[lx_site_count];
     uint32_t surface[lx_site_count];
     uint32_t good, moved; // bit k: site k
-    bool split;           // the good ones lie in more than one room
+    bool split;           // the good ones lie in more than one room, or some of them under something low
 } company;
 
 // ---- what a place sees ------------------------------------------------------------------------------------------------------
@@ -55,26 +55,47 @@ static lx_ray look(const lx_receiver *r, uint32_t stream, uint32_t number)
     return (lx_ray){.origin = lx_offset_origin(r->position, r->geometric_normal), .direction = lx_to_world(r->geometric_normal, local), .t_max = INFINITY};
 }
 
-static uint32_t count_backs(const lx_tracer *tracer, const lx_receiver *r, uint32_t stream, uint32_t first, uint32_t end)
+typedef struct view {
+    uint32_t looks, backs;
+} view;
+
+// What is touched rather than seen does not count: in the corner of two walls it would hide what the place is inside of.
+static void look_around(const company *c, const lx_receiver *r, uint32_t site, uint32_t first, uint32_t end, view *out)
 {
-    uint32_t backs = 0;
+    const uint32_t stream = lx_hash_combine(c->stream, 0x51e30000u + site);
+    const float touch = 0.01f * c->texel_m[site];
     for (uint32_t i = first; i < end; ++i) {
         const lx_ray ray = look(r, stream, i);
         lx_hit hit;
-        lx_trace_closest(tracer, &ray, &hit, 1);
-        backs += is_back(tracer, &ray, &hit);
+        lx_trace_closest(c->tracer, &ray, &hit, 1);
+        if (hit.surface != LX_MISS && hit.t < touch) continue;
+        ++out->looks;
+        out->backs += is_back(c->tracer, &ray, &hit);
     }
-    return backs;
 }
 
+static bool is_open(const view *v)
+{
+    return v->looks > 0 && most_backs * v->backs <= v->looks;
+}
+
+static bool is_surely_good(const company *c, const lx_receiver *r, uint32_t site)
+{
+    view v = {0};
+    look_around(c, r, site, 0, all_looks, &v);
+    return is_open(&v);
+}
+
+// Quicker; one place in twenty that looks at backs half around passes.
 static bool is_good(const company *c, const lx_receiver *r, uint32_t site)
 {
-    const uint32_t stream = lx_hash_combine(c->stream, 0x51e30000u + site);
-    uint32_t backs = count_backs(c->tracer, r, stream, 0, first_looks / 2);
-    if (backs == first_looks / 2) return false;
-    backs += count_backs(c->tracer, r, stream, first_looks / 2, first_looks);
-    if (backs == 0) return true;
-    return backs + count_backs(c->tracer, r, stream, first_looks, all_looks) <= most_backs;
+    view v = {0};
+    look_around(c, r, site, 0, first_looks / 2, &v);
+    if (v.backs == first_looks / 2) return false;
+    look_around(c, r, site, first_looks / 2, first_looks, &v);
+    if (v.looks == first_looks && v.backs == 0) return true;
+    look_around(c, r, site, first_looks, all_looks, &v);
+    return is_open(&v);
 }
 
 // One look from each site. True if none of them sees a back: then all are good.
@@ -87,6 +108,22 @@ static bool all_look_free(const company *c)
     for (uint32_t k = 0; k < lx_site_count; ++k)
         if (is_back(c->tracer, &rays[k], &hits[k])) return false;
     return true;
+}
+
+// Does something hang so low over some of the good sites, and not over others, that their mean says little of either?
+static bool is_half_covered(const company *c)
+{
+    lx_ray rays[lx_site_count];
+    lx_rgb passes[lx_site_count];
+    uint32_t count = 0, covered = 0;
+    for (uint32_t k = 0; k < lx_site_count; ++k) {
+        if (!(c->good >> k & 1)) continue;
+        const lx_receiver *r = &c->sites[k];
+        rays[count++] = (lx_ray){.origin = lx_offset_origin(r->position, r->geometric_normal), .direction = r->geometric_normal, .t_max = 0.5f * c->texel_m[k]};
+    }
+    lx_trace_transmittance(c->tracer, rays, passes, count);
+    for (uint32_t i = 0; i < count; ++i) covered += lx_rgb_is_black(passes[i]);
+    return covered > 0 && covered < count;
 }
 
 // ---- moving out -------------------------------------------------------------------------------------------------------------
@@ -137,17 +174,19 @@ static int find_exits(const lx_tracer *tracer, const lx_receiver *r, float reach
     return count;
 }
 
-// A place must stay over the texel's own surface: beyond its edge light is that of another room, or of the open air.
-static bool is_over(const lx_tracer *tracer, uint32_t surface, float texel_m, const lx_receiver *r)
+// A place must stay over the texel's own surface, by a margin: beyond its edge, or on it, light is that of another room or of the open air.
+static bool is_over(const lx_tracer *tracer, uint32_t surface, float texel_m, const lx_receiver *from, const lx_receiver *to)
 {
-    const float height = 0.05f * texel_m;
-    const lx_ray ray = {.origin = lx_mad(r->position, r->geometric_normal, height), .direction = lx_neg(r->geometric_normal), .t_max = 2 * height};
+    const float height = 0.05f * texel_m, margin = 0.02f * texel_m;
+    const lx_vec3 way = lx_normalize_or(lx_sub(to->position, from->position), (lx_vec3){0, 0, 0});
+    const lx_vec3 n = to->geometric_normal, place = lx_mad(to->position, way, margin);
+    const lx_ray ray = {.origin = lx_mad(place, n, height), .direction = lx_neg(n), .t_max = 2 * height};
     lx_hit hit;
     lx_trace_closest(tracer, &ray, &hit, 1);
     if (hit.surface != surface) return false;
     lx_vec3 position, normal;
     lx_hit_geometry(tracer, &hit, &position, &normal);
-    return lx_dot(normal, r->geometric_normal) > 0.5f;
+    return lx_dot(normal, n) > 0.5f;
 }
 
 static bool move_out(const company *c, uint32_t site, lx_receiver *r)
@@ -160,8 +199,8 @@ static bool move_out(const company *c, uint32_t site, lx_receiver *r)
         for (int i = 0; i < count; ++i) {
             lx_receiver there = *r;
             there.position = exits[i].position;
-            if (!is_over(c->tracer, c->surface[site], c->texel_m[site], &there)) continue;
-            if (is_good(c, &there, site)) {
+            if (!is_over(c->tracer, c->surface[site], c->texel_m[site], r, &there)) continue;
+            if (is_surely_good(c, &there, site)) {
                 *r = there;
                 return true;
             }
@@ -296,18 +335,20 @@ static uint32_t choose_sites(company *c)
     if (all_look_free(c)) {
         c->good = (1u << lx_site_count) - 1;
         const uint32_t room = largest_room(c, &rooms);
-        c->split = rooms > 1;
+        c->split = rooms > 1 || is_half_covered(c);
         return room;
     }
     for (uint32_t k = 0; k < lx_site_count; ++k)
         if (is_good(c, &c->sites[k], k)) c->good |= 1u << k;
+    for (uint32_t k = 0; k < lx_site_count && bit_count(c->good) < enough_sites; ++k) // each of a few weighs much
+        if (c->good >> k & 1 && !is_surely_good(c, &c->sites[k], k)) c->good &= ~(1u << k);
     move_sites(c, enough_sites);
     uint32_t room = largest_room(c, &rooms);
     if (rooms > 1 && c->moved) { // too close a vote for so few: neighbours along a wall must come to the same side of it
         move_sites(c, lx_site_count);
         room = largest_room(c, &rooms);
     }
-    c->split = rooms > 1;
+    c->split = rooms > 1 || is_half_covered(c);
     return room;
 }
 
@@ -341,7 +382,7 @@ static uint32_t settle_texel(lx_texel *t, lx_settled *out)
     }
     const uint32_t chosen = choose_sites(&c);
     if (chosen == 0) return LX_SITES_INVALID;
-    if (chosen == (1u << lx_site_count) - 1 && !c.moved) return LX_SITES_PLAIN;
+    if (chosen == (1u << lx_site_count) - 1 && !c.moved && !c.split) return LX_SITES_PLAIN;
     replace_others(&c, chosen, out);
     out->split = c.split;
     return 0;

@@ -17,5 +17,7 @@ static inline double lx_lap(double *start)
 
 /// Largest resident size of this process so far, in bytes; 0 if the system does not tell.
 uint64_t lx_peak_memory(void);
+/// Resident size now, likewise.
+uint64_t lx_resident_memory(void);
 
 #endif

@@ -12,6 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/ioctl.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -77,6 +78,38 @@ cleanup:
     lx_free(data);
     close(file);
     return result;
+}
+
+lx_result lx_file_map_open(const char *path, lx_file_map *out, lx_error *error)
+{
+    lx_result result = LX_OK;
+    struct stat info;
+    const int file = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+    if (file < 0) return fail_errno(error, "cannot read");
+    if (fstat(file, &info) != 0) {
+        result = fail_errno(error, "cannot read");
+    } else if (!S_ISREG(info.st_mode) || info.st_size == 0) {
+        result = lx_fail(error, LX_ERROR_FORMAT, "cannot read: not a regular file, or empty");
+    } else {
+        void *data = mmap(NULL, (size_t)info.st_size, PROT_READ, MAP_PRIVATE, file, 0);
+        if (data == MAP_FAILED)
+            result = fail_errno(error, "cannot read");
+        else
+            *out = (lx_file_map){data, (size_t)info.st_size};
+    }
+    close(file);
+    return result;
+}
+
+void lx_file_map_rest(const lx_file_map *map)
+{
+    if (map->data) madvise((void *)map->data, map->size, MADV_DONTNEED); // never written to: nothing is lost
+}
+
+void lx_file_map_release(lx_file_map *map)
+{
+    if (map->data) munmap((void *)map->data, map->size);
+    *map = (lx_file_map){0};
 }
 
 static lx_result flush_folder_of(const char *path)

@@ -16,6 +16,18 @@ void lx_bytes_release(lx_bytes *bytes);
 /// Reads a whole regular file of at most `limit` bytes (LX_ERROR_LIMIT beyond). Messages are "cannot read: reason", without the path.
 lx_result lx_file_read(const char *path, size_t limit, lx_bytes *out, lx_error *error);
 
+/// A file's content in the address space: pages come from disk when they are read. Whoever cuts the file short meanwhile ends the
+/// process, so this is for files of our own. All zero is legal to release.
+typedef struct lx_file_map {
+    const uint8_t *data;
+    size_t size;
+} lx_file_map;
+
+lx_result lx_file_map_open(const char *path, lx_file_map *out, lx_error *error);
+/// Takes what was read so far out of memory; it comes back when it is read again.
+void lx_file_map_rest(const lx_file_map *map);
+void lx_file_map_release(lx_file_map *map);
+
 /// Writes to a temporary file beside `path`, flushes it to disk and renames it, so that `path` holds the old or the new content.
 lx_result lx_file_write(const char *path, const void *data, size_t size, lx_error *error);
 

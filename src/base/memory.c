@@ -5,6 +5,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#if defined(__GLIBC__)
+#include <malloc.h>
+#endif
 
 bool lx_mul_size(size_t a, size_t b, size_t *out)
 {
@@ -37,6 +40,13 @@ void *lx_calloc_array(size_t count, size_t size)
 void lx_free(void *memory)
 {
     free(memory);
+}
+
+void lx_trim_memory(void)
+{
+#if defined(__GLIBC__)
+    malloc_trim(0);
+#endif
 }
 
 char *lx_strndup(const char *text, size_t length)

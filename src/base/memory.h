@@ -9,6 +9,8 @@
 void *lx_malloc_array(size_t count, size_t size);
 void *lx_calloc_array(size_t count, size_t size);
 void lx_free(void *memory);
+/// Gives what is free, but kept for later allocations, back to the system. Slow enough to do it between stages only.
+void lx_trim_memory(void);
 
 /// Copy of a string, of at most `length` bytes of it.
 char *lx_strdup(const char *text);

@@ -13,7 +13,7 @@
 
 struct lx_scratch {
     int file;
-    char *folder; // for messages
+    char *folder; // for messages; NULL: the file has a name, which callers know
 };
 
 // Not every file system knows files without a name: there the name is taken away at once.
@@ -55,6 +55,31 @@ lx_result lx_scratch_create(const char *folder, lx_scratch **out_scratch, lx_err
     return LX_OK;
 }
 
+lx_result lx_scratch_create_file(const char *path, lx_scratch **out_scratch, lx_error *error)
+{
+    lx_scratch *scratch = lx_malloc_array(1, sizeof *scratch);
+    if (!scratch) return lx_fail_memory(error, "file");
+    *scratch = (lx_scratch){.file = open(path, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0666)};
+    if (scratch->file < 0) {
+        const lx_result result = lx_fail(error, LX_ERROR_IO, "cannot write: %s", strerror(errno));
+        lx_scratch_destroy(scratch);
+        return result;
+    }
+    *out_scratch = scratch;
+    return LX_OK;
+}
+
+static lx_result fail(const lx_scratch *scratch, const char *verb, const char *reason, lx_error *error)
+{
+    if (!scratch->folder) return lx_fail(error, LX_ERROR_IO, "cannot %s: %s", verb, reason);
+    return lx_fail(error, LX_ERROR_IO, "cannot %s a temporary file in %s: %s", verb, scratch->folder, reason);
+}
+
+lx_result lx_scratch_flush(lx_scratch *scratch, lx_error *error)
+{
+    return fsync(scratch->file) == 0 ? LX_OK : fail(scratch, "write", strerror(errno), error);
+}
+
 void lx_scratch_destroy(lx_scratch *scratch)
 {
     if (!scratch) return;
@@ -69,8 +94,7 @@ lx_result lx_scratch_write(lx_scratch *scratch, uint64_t offset, const void *dat
     while (size > 0) {
         const ssize_t count = pwrite(scratch->file, from, size, (off_t)offset);
         if (count < 0 && errno == EINTR) continue;
-        if (count <= 0)
-            return lx_fail(error, LX_ERROR_IO, "cannot write a temporary file in %s: %s", scratch->folder, strerror(count < 0 ? errno : ENOSPC));
+        if (count <= 0) return fail(scratch, "write", strerror(count < 0 ? errno : ENOSPC), error);
         from += count;
         offset += (uint64_t)count;
         size -= (size_t)count;
@@ -84,9 +108,7 @@ lx_result lx_scratch_read(const lx_scratch *scratch, uint64_t offset, void *data
     while (size > 0) {
         const ssize_t count = pread(scratch->file, to, size, (off_t)offset);
         if (count < 0 && errno == EINTR) continue;
-        if (count <= 0)
-            return lx_fail(error, LX_ERROR_IO, "cannot read a temporary file in %s: %s", scratch->folder,
-                           count < 0 ? strerror(errno) : "it ends too early");
+        if (count <= 0) return fail(scratch, "read", count < 0 ? strerror(errno) : "it ends too early", error);
         to += count;
         offset += (uint64_t)count;
         size -= (size_t)count;

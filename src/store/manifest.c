@@ -25,7 +25,16 @@ void lx_manifest_release(lx_manifest *manifest)
 
 uint64_t lx_content_hash(const void *data, size_t size)
 {
-    const uint64_t hash = lx_hash_bytes(0xcbf29ce484222325u, data, size);
+    return lx_content_hash_end(lx_content_hash_add(LX_CONTENT_HASH_START, data, size));
+}
+
+uint64_t lx_content_hash_add(uint64_t hash, const void *data, size_t size)
+{
+    return lx_hash_bytes(hash, data, size);
+}
+
+uint64_t lx_content_hash_end(uint64_t hash)
+{
     return hash ? hash : 1;
 }
 

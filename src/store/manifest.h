@@ -92,6 +92,10 @@ void lx_manifest_release(lx_manifest *manifest);
 
 /// FNV-1a of a file's bytes, never 0.
 uint64_t lx_content_hash(const void *data, size_t size);
+/// The same piece by piece: start, add …, end.
+#define LX_CONTENT_HASH_START 0xcbf29ce484222325u
+uint64_t lx_content_hash_add(uint64_t hash, const void *data, size_t size);
+uint64_t lx_content_hash_end(uint64_t hash);
 
 /// True if `path` is relative and stays below the folder it starts from: no "..", no backslash, no drive, nothing empty.
 bool lx_path_stays_inside(const char *path);

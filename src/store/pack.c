@@ -4,7 +4,9 @@
 
 #include "base/error.h"
 #include "base/memory.h"
+#include "base/scratch.h"
 #include "image/encode.h"
+#include "store/manifest.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -24,6 +26,7 @@ enum {
     section_alignment = 64,
     block_alignment = 4096,
     section_count = 10,
+    waiting_blocks = 64, // until they are written
     max_page_size = 16384,
     max_page_count = 65536,
     max_layer_count = 1 << 20,
@@ -47,8 +50,11 @@ typedef struct layer_coding {
 } layer_coding;
 
 struct lx_pack_writer {
-    uint8_t *data;
-    size_t size, capacity;
+    uint8_t *data;      // all of it, or with a file: what comes before the blocks
+    size_t size, capacity; // size: of all of it
+    lx_scratch *file;   // NULL: none
+    uint8_t *waiting;   // with a file: blocks that come next
+    size_t waiting_bytes;
     uint32_t page_size, page_count, layer_count, level_count;
     uint32_t entries_per_image_set; // of one layer's page, all levels
     uint32_t level_first[16];
@@ -436,9 +442,29 @@ cleanup:
     return result;
 }
 
+lx_result lx_pack_begin_file(const lx_pack_desc *desc, const char *path, lx_pack_writer **out_writer, lx_error *error)
+{
+    lx_result result = LX_OK;
+    lx_pack_writer *writer = NULL;
+    LX_TRY(lx_pack_begin(desc, &writer, error));
+    writer->waiting = lx_malloc_array(waiting_blocks, block_bytes);
+    if (!writer->waiting) {
+        result = lx_fail_memory(error, "luxel.pack");
+        goto cleanup;
+    }
+    LX_TRY(lx_scratch_create_file(path, &writer->file, error));
+    *out_writer = writer;
+    writer = NULL;
+cleanup:
+    lx_pack_destroy(writer);
+    return result;
+}
+
 void lx_pack_destroy(lx_pack_writer *writer)
 {
     if (!writer) return;
+    lx_scratch_destroy(writer->file);
+    lx_free(writer->waiting);
     lx_free(writer->data);
     lx_free(writer->layers);
     lx_free(writer);
@@ -475,6 +501,34 @@ static bool encode_block(const layer_coding *coding, uint32_t size, uint32_t x0,
     return visible;
 }
 
+static lx_result write_waiting(lx_pack_writer *writer, lx_error *error)
+{
+    const size_t bytes = writer->waiting_bytes;
+    writer->waiting_bytes = 0;
+    const lx_result result = bytes ? lx_scratch_write(writer->file, writer->size - bytes, writer->waiting, bytes, error) : LX_OK;
+    if (result != LX_OK) lx_error_prefix(error, "luxel.pack");
+    return result;
+}
+
+static lx_result append_block(lx_pack_writer *writer, const uint32_t *texels, lx_error *error)
+{
+    uint8_t *out;
+    if (writer->file) {
+        if (writer->waiting_bytes == (size_t)waiting_blocks * block_bytes) {
+            const lx_result result = write_waiting(writer, error);
+            if (result != LX_OK) return result;
+        }
+        out = writer->waiting + writer->waiting_bytes;
+        writer->waiting_bytes += block_bytes;
+    } else {
+        if (!lx_array_reserve(&writer->data, &writer->capacity, writer->size + block_bytes, 1)) return lx_fail_memory(error, "luxel.pack");
+        out = writer->data + writer->size;
+    }
+    for (int k = 0; k < block_texels; ++k) store_u32(out + 4 * k, texels[k]);
+    writer->size += block_bytes;
+    return LX_OK;
+}
+
 lx_result lx_pack_add_image(lx_pack_writer *writer, uint32_t page, uint32_t layer, uint32_t level, const float *rgb, lx_error *error)
 {
     if (page >= writer->page_count || layer >= writer->layer_count || level >= writer->level_count)
@@ -489,25 +543,54 @@ lx_result lx_pack_add_image(lx_pack_writer *writer, uint32_t page, uint32_t laye
             continue;
         }
         if (writer->stats.block_count == UINT32_MAX - 1) return lx_fail(error, LX_ERROR_LIMIT, "luxel.pack: more than 2^32 blocks");
-        if (!lx_array_reserve(&writer->data, &writer->capacity, writer->size + block_bytes, 1)) return lx_fail_memory(error, "luxel.pack");
+        const lx_result result = append_block(writer, texels, error);
+        if (result != LX_OK) return result;
         ++writer->stats.block_count;
-        for (int k = 0; k < block_texels; ++k) store_u32(writer->data + writer->size + 4 * k, texels[k]);
-        writer->size += block_bytes;
         store_u32(writer->data + writer->block_index_offset + 4 * (first + i), (uint32_t)writer->stats.block_count);
     }
     return LX_OK;
 }
 
+// Tables last, when all of them is known; then the hash, which goes through the file from its start.
+static lx_result finish_file(lx_pack_writer *writer, uint64_t *out_hash, lx_error *error)
+{
+    lx_result result = LX_OK;
+    result = write_waiting(writer, error);
+    if (result != LX_OK) return result;
+    LX_TRY(lx_scratch_write(writer->file, 0, writer->data, writer->blocks_offset, error));
+    uint64_t hash = lx_content_hash_add(LX_CONTENT_HASH_START, writer->data, writer->blocks_offset);
+    for (size_t at = writer->blocks_offset; at < writer->size;) {
+        const size_t left = writer->size - at, bytes = left < (size_t)waiting_blocks * block_bytes ? left : (size_t)waiting_blocks * block_bytes;
+        LX_TRY(lx_scratch_read(writer->file, at, writer->waiting, bytes, error));
+        hash = lx_content_hash_add(hash, writer->waiting, bytes);
+        at += bytes;
+    }
+    LX_TRY(lx_scratch_flush(writer->file, error));
+    *out_hash = lx_content_hash_end(hash);
+cleanup:
+    if (result != LX_OK) lx_error_prefix(error, "luxel.pack");
+    return result;
+}
+
 lx_result lx_pack_finish(lx_pack_writer *writer, lx_bytes *out, lx_pack_stats *out_stats, lx_error *error)
 {
+    lx_result result = LX_OK;
     if (!writer->data) return lx_fail(error, LX_ERROR_INVALID_ARGUMENT, "luxel.pack: already finished");
     uint8_t *entry = writer->data + writer->blocks_entry;
     store_u64(entry + 16, writer->size - writer->blocks_offset);
     store_u32(entry + 24, (uint32_t)writer->stats.block_count);
     store_u64(writer->data + 16, writer->size);
-    *out = (lx_bytes){writer->data, writer->size};
+    writer->stats.bytes = writer->size;
+    if (writer->file) {
+        LX_TRY(finish_file(writer, &writer->stats.hash, error));
+        lx_free(writer->data);
+        *out = (lx_bytes){0};
+    } else {
+        *out = (lx_bytes){writer->data, writer->size};
+    }
     if (out_stats) *out_stats = writer->stats;
     writer->data = NULL;
     writer->size = writer->capacity = 0;
-    return LX_OK;
+cleanup:
+    return result;
 }

@@ -86,6 +86,7 @@ typedef struct lx_pack_stats {
     /// Largest error of a stored texel relative to its largest channel, over texels that RGB9E5 holds with its full precision
     /// (the 30 octaves below the layer's brightest). At most 1/512.
     float largest_error;
+    uint64_t bytes, hash; ///< Of the whole file; the hash as lx_content_hash, of packs that went to a file.
 } lx_pack_stats;
 
 /// The scale for a layer whose largest channel anywhere is `largest`: that becomes 2^14 … 2^15. 1 for a black layer.
@@ -96,10 +97,13 @@ uint32_t lx_pack_level_count(uint32_t page_size, uint32_t padding);
 typedef struct lx_pack_writer lx_pack_writer;
 
 lx_result lx_pack_begin(const lx_pack_desc *desc, lx_pack_writer **out_writer, lx_error *error);
+/// The same into a new file at `path`, block by block: only tables are in memory.
+lx_result lx_pack_begin_file(const lx_pack_desc *desc, const char *path, lx_pack_writer **out_writer, lx_error *error);
 /// One layer of one mip level of a page: (page_size >> level)² RGB floats, row 0 first. Images may come in any order, each at most
 /// once; those that don't come are black.
 lx_result lx_pack_add_image(lx_pack_writer *writer, uint32_t page, uint32_t layer, uint32_t level, const float *rgb, lx_error *error);
-/// The finished file; the writer is left empty, good for lx_pack_destroy alone. `out_stats` may be NULL.
+/// The finished file, or nothing where it was written by lx_pack_begin_file; the writer is left empty, good for lx_pack_destroy alone.
+/// `out_stats` may be NULL.
 lx_result lx_pack_finish(lx_pack_writer *writer, lx_bytes *out, lx_pack_stats *out_stats, lx_error *error);
 void lx_pack_destroy(lx_pack_writer *writer);
 

@@ -1,6 +1,6 @@
 // Emissive triangles: tables for choosing points by area × brightness.
 //
-// A source's triangles are chosen by their power. A textured triangle is cut by a regular grid of its barycentrics, fine enough that a
+// A source's triangles are chosen by a light tree, or if they are few by their power. A textured triangle is cut by a regular grid of its barycentrics, fine enough that a
 // piece covers some two texels across; each piece is chosen by its mean brightness, but never by less than a small share of the
 // triangle's, because the estimate of a piece may miss what lies between its lookups.
 #include "trace/emitters.h"
@@ -9,6 +9,7 @@
 #include "trace/sampling.h"
 #include "trace/tracer_data.h"
 
+enum { most_without_tree = 8 };
 enum { max_grid = 64, least_lookups = 3, most_lookups = 16 }; // lookups: per edge of a piece
 static const float lookup_budget = 1 << 24; // for a surface, beyond the least: some tenths of a second
 static const float least_share = 0.02f; // of a triangle's mean brightness, for every piece
@@ -173,6 +174,39 @@ static lx_result add_surface(lx_tracer *tracer, lx_emitters *emitters, size_t *t
     return LX_OK;
 }
 
+// A tree over the bright triangles of a source, if there are many. Not where light is told by cell: every cell is a layer of its own, and those that
+// are far or turned away want their samples as well.
+static lx_result build_tree(const lx_tracer *tracer, lx_emitters *emitters, uint32_t source, lx_light_leaf *leaves, lx_error *error)
+{
+    uint32_t count = 0;
+    emitters->tree_roots[source] = LX_NO_LIGHT_NODE;
+    if (tracer->source_cells[source] > 0) return LX_OK;
+    for (uint32_t i = emitters->first_triangle[source]; i < emitters->first_triangle[source + 1]; ++i) {
+        const lx_emitter_triangle *t = &emitters->triangles[i];
+        if (!(t->probability > 0)) continue;
+        lx_light_leaf *leaf = &leaves[count++];
+        *leaf = (lx_light_leaf){.normal = t->normal, .power = t->probability, .both_sides = t->double_sided, .triangle = i};
+        lx_triangle_corners(tracer, t->surface, t->triangle, leaf->corner);
+    }
+    if (count <= most_without_tree) return LX_OK;
+    for (uint32_t k = 0; k < count; ++k) emitters->triangles[leaves[k].triangle].in_tree = true;
+    return lx_light_tree_add(&emitters->tree, leaves, count, &emitters->tree_roots[source], error);
+}
+
+static lx_result build_trees(const lx_tracer *tracer, lx_emitters *emitters, lx_error *error)
+{
+    emitters->tree.place = lx_calloc_array(emitters->triangle_count, sizeof *emitters->tree.place);
+    emitters->tree.share_of = lx_calloc_array(emitters->triangle_count, sizeof *emitters->tree.share_of);
+    emitters->tree_roots = lx_calloc_array(tracer->scene->source_count, sizeof *emitters->tree_roots);
+    lx_light_leaf *leaves = lx_malloc_array(emitters->triangle_count, sizeof *leaves);
+    lx_result result = LX_OK;
+    if (!emitters->tree.place || !emitters->tree.share_of || !emitters->tree_roots || !leaves) result = lx_fail_memory(error, "light tree");
+    for (uint32_t source = 0; result == LX_OK && source < tracer->scene->source_count; ++source)
+        result = build_tree(tracer, emitters, source, leaves, error);
+    lx_free(leaves);
+    return result;
+}
+
 lx_result lx_emitters_build(lx_tracer *tracer, lx_error *error)
 {
     const lx_scene *scene = tracer->scene;
@@ -209,7 +243,7 @@ lx_result lx_emitters_build(lx_tracer *tracer, lx_error *error)
         }
         build_guide(cdf, end - first, emitters->triangle_guide + first + source);
     }
-    return LX_OK;
+    return build_trees(tracer, emitters, error);
 }
 
 void lx_emitters_release(lx_emitters *emitters)
@@ -221,6 +255,8 @@ void lx_emitters_release(lx_emitters *emitters)
     lx_free(emitters->piece_guide);
     lx_free(emitters->first_triangle);
     lx_free(emitters->source_power);
+    lx_free(emitters->tree_roots);
+    lx_light_tree_release(&emitters->tree);
     *emitters = (lx_emitters){0};
 }
 
@@ -234,14 +270,27 @@ static uint32_t choose(const float *cdf, const uint32_t *guide, uint32_t count, 
     return low;
 }
 
-bool lx_emitters_sample(const lx_emitters *emitters, uint32_t source, lx_vec2 u, lx_emitter_sample *out)
+// A triangle of a source for a viewer, and how probable it was; u becomes its place within the choice.
+static const lx_emitter_triangle *choose_triangle(const lx_emitters *emitters, uint32_t source, lx_vec3 viewer, float *u, float *probability)
 {
+    if (emitters->tree_roots[source] != LX_NO_LIGHT_NODE) {
+        uint32_t index;
+        return lx_light_tree_sample(&emitters->tree, emitters->tree_roots[source], viewer, u, &index, probability) ? &emitters->triangles[index] : NULL;
+    }
     const uint32_t first = emitters->first_triangle[source], count = emitters->first_triangle[source + 1] - first;
     const float *cdf = emitters->triangle_cdf + first + source;
-    if (count == 0 || !(cdf[count] > 0)) return false;
-    const lx_emitter_triangle *t = &emitters->triangles[first + choose(cdf, emitters->triangle_guide + first + source, count, &u.x)];
-    if (!(t->probability > 0)) return false;
-    *out = (lx_emitter_sample){.triangle = t, .pdf_area = t->probability / t->area};
+    if (count == 0 || !(cdf[count] > 0)) return NULL;
+    const lx_emitter_triangle *t = &emitters->triangles[first + choose(cdf, emitters->triangle_guide + first + source, count, u)];
+    *probability = t->probability;
+    return t->probability > 0 ? t : NULL;
+}
+
+bool lx_emitters_sample(const lx_emitters *emitters, uint32_t source, lx_vec3 viewer, lx_vec2 u, lx_emitter_sample *out)
+{
+    float probability;
+    const lx_emitter_triangle *t = choose_triangle(emitters, source, viewer, &u.x, &probability);
+    if (!t) return false;
+    *out = (lx_emitter_sample){.triangle = t, .pdf_area = probability / t->area};
     if (t->grid == 1) {
         const lx_vec2 b = lx_sample_triangle(u);
         out->u = b.x;
@@ -259,11 +308,12 @@ bool lx_emitters_sample(const lx_emitters *emitters, uint32_t source, lx_vec2 u,
     return out->pdf_area > 0;
 }
 
-float lx_emitters_pdf_area(const lx_emitters *emitters, uint32_t index, float u, float v)
+float lx_emitters_pdf_area(const lx_emitters *emitters, uint32_t index, lx_vec3 viewer, float u, float v)
 {
     const lx_emitter_triangle *t = &emitters->triangles[index];
     if (!(t->probability > 0)) return 0;
-    const float uniform = t->probability / t->area;
+    const float probability = t->in_tree ? lx_light_tree_probability(&emitters->tree, index, viewer) : t->probability;
+    const float uniform = probability / t->area;
     if (t->grid == 1) return uniform;
     const uint32_t n = t->grid;
     const float x = lx_clamp(u, 0, 1) * (float)n, y = lx_clamp(v, 0, 1) * (float)n;

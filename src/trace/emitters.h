@@ -3,6 +3,7 @@
 #define LX_TRACE_EMITTERS_H
 
 #include "scene/scene.h"
+#include "trace/light_tree.h"
 
 /// One triangle of an emissive source. Textured ones are cut into grid² × 2 pieces of equal area (half of the table's entries lie
 /// outside the triangle and weigh nothing), so that bright texels get more samples.
@@ -12,7 +13,8 @@ typedef struct lx_emitter_triangle {
     bool double_sided; ///< Shines from both sides.
     bool plain;        ///< Radiance 1 everywhere: no texture, no holes.
     uint32_t surface, triangle;
-    float probability; ///< Of being chosen within its source.
+    float probability; ///< Its share of its source's power; of being chosen, where there is no tree.
+    bool in_tree;      ///< The source's light tree says how probable it is.
     float area;        ///< m²
     uint32_t grid;     ///< Pieces per edge; 1: uniform, no table.
     uint32_t first_cdf; ///< Into piece_cdf: 2 grid² + 1 entries, if grid > 1.
@@ -24,6 +26,8 @@ typedef struct lx_emitters {
     float *piece_cdf;
     uint32_t *triangle_guide, *piece_guide; ///< Beside the running sums: the step at which the search for u = k / count may begin.
     uint32_t *first_triangle;       ///< [source_count + 1]
+    lx_light_tree tree;             ///< Of all sources that have one.
+    uint32_t *tree_roots;           ///< [source_count] LX_NO_LIGHT_NODE: few triangles, chosen by power.
     float *source_power;            ///< [source_count] sum of area × mean texture brightness, m²; 0 for sources that are not emissive.
     size_t triangle_count, piece_count;
 } lx_emitters;
@@ -40,9 +44,9 @@ struct lx_tracer;
 lx_result lx_emitters_build(struct lx_tracer *tracer, lx_error *error);
 void lx_emitters_release(lx_emitters *emitters);
 
-/// Chooses a point of a source. False if the source has nothing bright.
-bool lx_emitters_sample(const lx_emitters *emitters, uint32_t source, lx_vec2 u, lx_emitter_sample *out);
+/// Chooses a point of a source, for what lies at `viewer`. False if the source has nothing bright, or nothing that faces there.
+bool lx_emitters_sample(const lx_emitters *emitters, uint32_t source, lx_vec3 viewer, lx_vec2 u, lx_emitter_sample *out);
 /// The density with which lx_emitters_sample chooses that point. `index` is the emitter triangle's number.
-float lx_emitters_pdf_area(const lx_emitters *emitters, uint32_t index, float u, float v);
+float lx_emitters_pdf_area(const lx_emitters *emitters, uint32_t index, lx_vec3 viewer, float u, float v);
 
 #endif

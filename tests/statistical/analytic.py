@@ -5,8 +5,8 @@
     analytic.py LUXEL [CASE...]         runs them with this program
     analytic.py LUXEL --table [CASE...] the same, as the tables of docs/accuracy.md
 
-A case is a function of selftest.py, lamps.py, emitters.py, skies.py, panes.py, bounces.py, bakes.py or
-monitors.py. It makes a scene, lets Luxel compute irradiance in it, and compares with what oracle.py says, which shares nothing with Luxel's sources. Seeds are fixed: a case passes
+A case is a function of selftest.py, lamps.py, emitters.py, skies.py, panes.py, bounces.py, bakes.py,
+leak_cases.py or monitors.py. It makes a scene, lets Luxel compute irradiance in it, and compares with what oracle.py says, which shares nothing with Luxel's sources. Seeds are fixed: a case passes
 always or never.
 """
 
@@ -17,11 +17,11 @@ import tempfile
 import time
 
 import measure
-import selftest, lamps, emitters, skies, panes, bounces, bakes, monitors, convergence
+import selftest, lamps, emitters, skies, panes, bounces, bakes, leak_cases, monitors, convergence
 
 
 GROUPS = {"lamps": "Lamps", "emitters": "Emissive surfaces", "skies": "Skies", "panes": "Panes, holes, glass",
-          "bounces": "Bounced light, scales, leaks", "bakes": "Baked texels and layers", "monitors": "Monitors", "convergence": "Convergence",
+          "bounces": "Bounced light, scales, leaks", "bakes": "Baked texels and layers", "leak_cases": "Light where none may be", "monitors": "Monitors", "convergence": "Convergence",
           "selftest": "The oracles themselves"}
 
 

@@ -1,0 +1,140 @@
+// Sums of what is allocated where. The numbers repeat what other files allocate; a test holds them against the peak that the system counts.
+#include "bake/memory_plan.h"
+
+#include "bake/gather_rays.h"
+#include "base/clock.h"
+#include "base/error.h"
+#include "base/memory.h"
+#include "post/denoise.h"
+
+// What gathering keeps, in bytes.
+static const struct {
+    // Per luxel:
+    uint32_t albedo;
+    uint32_t pass_ray;        // and ray of the passes: the luxel it hit,
+    uint32_t extra;           // and what paths that went on found, on average
+    uint32_t sum;             // estimate of the sum of all layers
+    uint32_t estimate;        // and layer: direct and indirect light
+    uint32_t row;             // and layer, layers padded: direct light, and radiosity of two passes, three half floats each
+    uint32_t denoised;        // and worker: a layer's direct and indirect light,
+    uint32_t denoise_scratch; // likewise: lx_denoise_scratch_bytes
+    // Per texel of the pages:
+    uint32_t place;
+    // Per tile and layer:
+    uint32_t tile;
+    // Per worker:
+    uint32_t batches;
+    uint32_t worker_row; // and layer, padded: sums of a tile
+    uint32_t worker_cell; // and cell of the largest monitor: light of a tile
+} cost = {
+    .albedo = sizeof(lx_rgb),
+    .pass_ray = sizeof(uint32_t),
+    .extra = 40,
+    .sum = 5 * sizeof(float),
+    .estimate = 2 * sizeof(lx_estimate),
+    .row = 3 * 3 * sizeof(uint16_t),
+    .denoised = 2 * sizeof(lx_rgb),
+    .denoise_scratch = 5 * sizeof(lx_estimate) + 2 * 5 * sizeof(float) + 2 * sizeof(float),
+    .place = 2 * sizeof(uint32_t),
+    .tile = 2 * sizeof(double) + sizeof(uint32_t) + 1,
+    .batches = 4 << 20,
+    .worker_row = lx_luxel_tile_edge * lx_luxel_tile_edge * 3 * sizeof(float),
+    .worker_cell = lx_luxel_tile_edge * lx_luxel_tile_edge * (sizeof(lx_rgb) + sizeof(float)),
+};
+
+enum { block_texels = lx_luxel_tile_edge * lx_luxel_tile_edge, most_pass_rays = 32, bare_process_bytes = 12 << 20 }; // libraries and what they set up at once
+
+static uint64_t texel_count(const lx_bake *bake)
+{
+    return (uint64_t)bake->atlas->page_size * bake->atlas->page_size * bake->atlas->page_count;
+}
+
+static uint64_t lookup_bytes(const lx_bake *bake)
+{
+    uint64_t triangles = 0;
+    for (uint32_t i = 0; i < bake->scene->primitive_count; ++i) triangles += bake->scene->primitives[i].triangle_count;
+    return texel_count(bake) * cost.place + triangles * sizeof(lx_lookup_triangle) + bake->scene->surface_count * sizeof(lx_lookup_surface);
+}
+
+static uint32_t largest_cell_count(const lx_bake *bake)
+{
+    uint32_t largest = 1;
+    for (uint32_t s = 0; s < bake->source_count; ++s) {
+        const uint32_t cells = lx_tracer_cell_count(bake->tracer, s);
+        if (cells > largest) largest = cells;
+    }
+    return largest;
+}
+
+// Layers are denoised one by one, each by one worker.
+static uint64_t denoise_bytes(const lx_bake_job *job, uint32_t workers, uint32_t layers)
+{
+    const uint64_t luxels = job->map.view.count;
+    const uint32_t busy = layers < workers ? layers : workers;
+    if (job->bake->desc.denoise == LX_DENOISE_NONE) return luxels * sizeof(lx_rgb) * busy;
+    const uint64_t graph = lx_denoise_graph_bytes(job->map.view.count), building = lx_denoise_graph_build_bytes(job->map.view.count);
+    const uint64_t working = graph + luxels * busy * (cost.denoised + cost.denoise_scratch);
+    return working > building ? working : building;
+}
+
+// What baking a group of `layers` adds to what is there.
+static uint64_t group_bytes(const lx_bake_job *job, uint32_t layers)
+{
+    const lx_bake *bake = job->bake;
+    const uint64_t luxels = job->map.view.count, padded = lx_row_layers(layers);
+    const uint32_t workers = lx_pool_worker_count(bake->scene->context->pool);
+    const bool bounces = !bake->desc.direct_only && bake->desc.transport.bounces > 0;
+    const uint64_t estimates = luxels * (cost.sum + (uint64_t)cost.estimate * layers) + (uint64_t)job->map.tile_count * cost.tile * layers;
+    uint64_t cache = lookup_bytes(bake) + workers * (cost.batches + cost.worker_row * padded + (uint64_t)cost.worker_cell * largest_cell_count(bake));
+    if (bounces) cache += luxels * (cost.albedo + cost.pass_ray * most_pass_rays + cost.extra + cost.row * padded);
+    const uint64_t finishing = denoise_bytes(job, workers, layers); // the cache is gone by then
+    return estimates + (cache > finishing ? cache : finishing);
+}
+
+// The whole process while it saves: what the bake leaves, a page at a time, and the scene as it is read back for preview and report.
+static uint64_t save_bytes(const lx_bake *bake, uint64_t resident, uint64_t finished)
+{
+    const uint64_t page = (uint64_t)bake->atlas->page_size * bake->atlas->page_size;
+    const uint64_t again = bake->created_bytes > bare_process_bytes ? bake->created_bytes - bare_process_bytes : 0;
+    const uint64_t images = page * 3 * sizeof(float) + page * (3 * sizeof(float) + sizeof(uint32_t)) / 3;
+    // Of the pack: its index, and a row of blocks of all layers, for which it is read back.
+    const uint64_t rows = (uint64_t)bake->layer_count * sizeof(uint32_t);
+    const uint64_t pack = rows * (texel_count(bake) * 4 / 3 / block_texels + (uint64_t)bake->atlas->page_size * lx_luxel_tile_edge);
+    const uint64_t pages = texel_count(bake) * 3 * sizeof(float);
+    return resident + finished + images + pack + again + pages;
+}
+
+lx_result lx_memory_plan_make(const lx_bake_job *job, lx_memory_plan *out, lx_error *error)
+{
+    const lx_bake *bake = job->bake;
+    const uint64_t limit = bake->desc.memory_bytes;
+    lx_trim_memory();
+    const uint64_t resident = lx_resident_memory(), before = lx_peak_memory();
+    const uint64_t finished = limit ? 0 : (uint64_t)job->map.view.count * bake->layer_count * sizeof(lx_rgb);
+    lx_memory_plan plan = {.resident_bytes = resident, .save_bytes = save_bytes(bake, resident, finished), .group_layers = bake->layer_count};
+    uint32_t least = bake->layer_count > 0 ? 1 : 0;
+    for (uint32_t i = 0; i < bake->layer_count; ++i) // cells follow one another
+        if (bake->layers[i].monitor && bake->layers[i].cell + 1 > least) least = bake->layers[i].cell + 1;
+    while (limit && plan.group_layers > least && resident + group_bytes(job, plan.group_layers) > limit) --plan.group_layers;
+    plan.group_bytes = group_bytes(job, plan.group_layers);
+    const uint64_t baking = resident + plan.group_bytes + finished;
+    plan.peak_bytes = baking > plan.save_bytes ? baking : plan.save_bytes;
+    if (before > plan.peak_bytes) plan.peak_bytes = before;
+    *out = plan;
+    if (!limit || plan.peak_bytes <= limit) return LX_OK;
+    const double mib = 1.0 / (1 << 20);
+    if (plan.peak_bytes == baking)
+        return lx_fail(error, LX_ERROR_LIMIT, "%.0f MiB of memory are not enough: %u texels and %u layer%s at once need %.0f MiB; fewer or smaller pages need less",
+                       (double)limit * mib, job->map.view.count, least, least == 1 ? "" : "s, the cells of a monitor,", (double)plan.peak_bytes * mib);
+    return lx_fail(error, LX_ERROR_LIMIT, "%.0f MiB of memory are not enough: %s needs %.0f MiB", (double)limit * mib,
+                   plan.peak_bytes == before ? "reading the scene" : "saving", (double)plan.peak_bytes * mib);
+}
+
+uint32_t lx_memory_group(const lx_bake *bake, const lx_memory_plan *plan, uint32_t first)
+{
+    const uint32_t left = bake->layer_count - first;
+    if (left <= plan->group_layers) return left;
+    uint32_t count = plan->group_layers;
+    while (count > 1 && bake->layers[first + count].monitor && bake->layers[first + count].cell > 0) --count;
+    return count;
+}

@@ -1,0 +1,58 @@
+/// A tree over the triangles of one emissive source: which of them to sample for a place, with exact probabilities.
+///
+/// Based on: [ContyKulla2018] Conty Estevez, Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", HPG 2018, and [PBR4] 12.6.3, with
+/// four children a node (their importances are one loop of four lanes), and several triangles a leaf, chosen by power.
+#ifndef LX_TRACE_LIGHT_TREE_H
+#define LX_TRACE_LIGHT_TREE_H
+
+#include "luxel/base.h"
+#include "math/vec.h"
+
+#include <stdint.h>
+
+enum { lx_light_tree_width = 4, lx_light_leaf_size = 8 };
+#define LX_NO_LIGHT_NODE UINT32_MAX
+
+/// Bounds of up to four children: a sphere around their triangles, a cone around their normals, their power. Of empty ones the power is 0.
+typedef struct lx_light_node {
+    float x[lx_light_tree_width], y[lx_light_tree_width], z[lx_light_tree_width], radius2[lx_light_tree_width];
+    float axis_x[lx_light_tree_width], axis_y[lx_light_tree_width], axis_z[lx_light_tree_width];
+    float cos_cone[lx_light_tree_width], sin_cone[lx_light_tree_width];
+    float both_sides[lx_light_tree_width]; ///< 1: the triangles shine from both.
+    float power[lx_light_tree_width];
+    uint32_t first[lx_light_tree_width];   ///< Leaf: into order; else a node.
+    uint32_t count[lx_light_tree_width];   ///< Triangles of a leaf; 0: not a leaf.
+    uint32_t parent;                       ///< 4 * node + child; LX_NO_LIGHT_NODE: the root.
+} lx_light_node;
+
+/// What the tree has to know of a triangle, and what it keeps of it.
+typedef struct lx_light_leaf {
+    lx_vec3 corner[3], normal; ///< Unit normal on the shining side.
+    float power;
+    bool both_sides;
+    uint32_t triangle; ///< The caller's number of it.
+} lx_light_leaf;
+
+typedef struct lx_light_tree {
+    lx_light_node *nodes;
+    size_t node_count, node_capacity;
+    // By position in the tree's order.
+    uint32_t *order; ///< Triangle there.
+    float *share;    ///< Its share of its leaf's power.
+    size_t order_count, order_capacity[2];
+    // By triangle; the caller makes room for them.
+    uint32_t *place; ///< 4 * node + child of its leaf.
+    float *share_of; ///< As share.
+} lx_light_tree;
+
+/// Adds a tree over `leaves` (their order is changed), count > 0, each of power above 0. `place` and `share_of` of their triangles are written.
+lx_result lx_light_tree_add(lx_light_tree *tree, lx_light_leaf *leaves, uint32_t count, uint32_t *out_root, lx_error *error);
+void lx_light_tree_release(lx_light_tree *tree);
+
+/// Chooses a triangle for what lies at `viewer`; u becomes its place within the choice. False: none shines there (or so little is certain that
+/// none was chosen: the estimate is 0).
+bool lx_light_tree_sample(const lx_light_tree *tree, uint32_t root, lx_vec3 viewer, float *u, uint32_t *triangle, float *probability);
+/// The probability that lx_light_tree_sample chooses that triangle of its tree.
+float lx_light_tree_probability(const lx_light_tree *tree, uint32_t triangle, lx_vec3 viewer);
+
+#endif
