@@ -69,7 +69,7 @@ def dark_room_of_sheets():
     return scene
 
 
-def _two_rooms(split):
+def _two_rooms(split, ceiling=True):
     scene = Gltf()
     white = scene.add_material("white", base_color=(0.8, 0.8, 0.8))
     (x0, y0, z0), (x1, y1, z1), w, t, middle = (-2.03, 0.0, -1.41), (1.93, 2.5, 1.52), 0.3, 0.02, 0.013
@@ -84,6 +84,8 @@ def _two_rooms(split):
         "east": ((x1, y0 - w, z0 - w), (x1 + w, y1 + w, z1 + w)),
         "wall": ((middle - t / 2, y0 - 0.1, z0 - 0.1), (middle + t / 2, y1 + 0.1, z1 + 0.1)),
     }
+    if not ceiling:
+        del across["ceiling"]
     for name, (lo, hi) in across.items():
         if split:
             solids[name + " 1"] = (lo, (middle, hi[1], hi[2]))
@@ -107,6 +109,16 @@ def thin_wall():
 def thin_wall_on_one_floor():
     """The same, but floor, ceiling and outer walls run through: their charts belong to both rooms."""
     return _two_rooms(False)
+
+
+def thin_wall_from_above():
+    """The same without a ceiling and with a blue lamp in the other room; nothing that could throw light back is higher than the wall."""
+    scene = _two_rooms(False, ceiling=False)
+    blue = scene.add_light("point", 100, name="blue lamp", color=(0.05, 0.2, 1))
+    scene.add_node("blue lamp", light=blue, translation=(1.1, 1.5, 0.3))
+    scene.json["extensions"]["KHR_lights_punctual"]["lights"][0]["color"] = [1, 0.25, 0.05]
+    _camera(scene, "above", (0.3, 7.6, 1.5), (-0.05, 1.3, 0.1), 42)
+    return scene
 
 
 def close_charts(page=64, gap=2.02):
@@ -164,7 +176,8 @@ def column():
     return scene
 
 
-SCENES = {f.__name__: f for f in (dark_room_of_boxes, dark_room_of_sheets, thin_wall, thin_wall_on_one_floor, close_charts, intersecting_boxes, column)}
+SCENES = {f.__name__: f for f in (dark_room_of_boxes, dark_room_of_sheets, thin_wall, thin_wall_on_one_floor, thin_wall_from_above,
+                                close_charts, intersecting_boxes, column)}
 
 
 if __name__ == "__main__":

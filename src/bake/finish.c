@@ -1,26 +1,40 @@
 #include "bake/finish.h"
 
+#include "bake/seams.h"
 #include "base/error.h"
 #include "post/denoise.h"
+#include "post/oidn.h"
 
-typedef struct finish_job {
+#include <string.h>
+
+struct lx_finish {
     const lx_bake_job *job;
+    lx_denoise_graph *graph; // NULL: not by our own denoiser
+    lx_oidn *oidn;           // NULL: not by the library
+    uint32_t *shown;         // [page][page_size²] for the library: the luxel that dilation shows at each texel
+    lx_stitch *stitch;
+    uint32_t entry_count;    // luxels, then padding texels that stitching writes
+};
+
+typedef struct layer_scratch {
+    lx_rgb *light, *indirect; // [entry], [luxel]
+    void *denoise, *stitch;
+} layer_scratch;
+
+typedef struct layers_job {
+    const lx_finish *finish;
     const lx_estimate *direct, *indirect;
-    uint32_t first_layer, luxel_count;
-    lx_denoise_graph *graph; // NULL: no denoising
-    struct finish_scratch {
-        lx_rgb *direct, *indirect; // [luxel]
-        void *denoise;
-    } *scratch; // [worker]
-} finish_job;
+    uint32_t first_layer;
+    layer_scratch *scratch; // [worker]
+} layers_job;
 
 // A step is open if a short ray, held a little above both luxels, meets nothing.
 static void can_step(void *user, const lx_luxel_step *steps, size_t count, bool *open)
 {
     enum { batch = 256 };
     static const float height = 0.25f; // texels
-    const lx_bake_job *job = user;
-    const lx_luxel_map *map = &job->map.view;
+    const lx_finish *f = user;
+    const lx_luxel_map *map = &f->job->map.view;
     lx_ray rays[batch];
     lx_rgb passes[batch];
     for (size_t first = 0; first < count; first += batch) {
@@ -31,55 +45,113 @@ static void can_step(void *user, const lx_luxel_step *steps, size_t count, bool 
             const lx_vec3 to = lx_mad(map->position[b], map->normal[b], height * map->size_m[b]);
             rays[i] = (lx_ray){.origin = from, .direction = lx_sub(to, from), .t_max = 1};
         }
-        lx_trace_transmittance(job->bake->tracer, rays, passes, n);
+        lx_trace_transmittance(f->job->bake->tracer, rays, passes, n);
         for (size_t i = 0; i < n; ++i) open[first + i] = !lx_rgb_is_black(passes[i]);
     }
 }
 
-static lx_result finish_layer(void *user, size_t task, uint32_t worker, lx_error *error)
+static lx_result open_denoiser(lx_finish *f, lx_error *error)
 {
-    const finish_job *f = user;
-    struct finish_scratch *s = &f->scratch[worker];
-    const lx_estimate *direct = f->direct + task * f->luxel_count, *indirect = f->indirect + task * f->luxel_count;
-    if (f->graph) {
-        lx_denoise_layer(f->graph, direct, s->denoise, s->direct);
-        lx_denoise_layer(f->graph, indirect, s->denoise, s->indirect);
-        for (uint32_t i = 0; i < f->luxel_count; ++i) s->direct[i] = lx_rgb_add(s->direct[i], s->indirect[i]);
-    } else {
-        for (uint32_t i = 0; i < f->luxel_count; ++i) s->direct[i] = lx_rgb_add(direct[i].mean, indirect[i].mean);
-    }
-    return lx_finished_write(f->job->bake->finished, f->first_layer + (uint32_t)task, 0, f->luxel_count, s->direct, error);
+    const lx_bake_job *job = f->job;
+    const lx_luxel_map *map = &job->map.view;
+    lx_pool *pool = job->bake->scene->context->pool;
+    if (job->bake->desc.denoise == LX_DENOISE_BUILTIN) return lx_denoise_graph_create(map, can_step, f, pool, &f->graph, error);
+    if (job->bake->desc.denoise == LX_DENOISE_NONE) return LX_OK;
+    const size_t texels = (size_t)map->page_size * map->page_size * map->page_count;
+    f->shown = lx_malloc_array(texels, sizeof *f->shown);
+    if (!f->shown) return lx_fail_memory(error, "denoising");
+    memcpy(f->shown, lx_finished_entries(job->bake->finished), texels * sizeof *f->shown);
+    return lx_oidn_open(NULL, lx_pool_worker_count(pool), &f->oidn, error);
 }
 
-lx_result lx_bake_finish_layers(const lx_bake_job *job, const lx_estimate *direct, const lx_estimate *indirect, uint32_t first_layer,
-                                uint32_t layer_count, lx_error *error)
+static lx_result open_stitch(lx_finish *f, lx_error *error)
+{
+    lx_bake *bake = f->job->bake;
+    lx_seam *seams = NULL;
+    size_t count = 0;
+    lx_result result = LX_OK;
+    LX_TRY(lx_seams_find(bake, &seams, &count, error));
+    LX_TRY(lx_stitch_create(&f->job->map.view, lx_finished_entries(bake->finished), bake->texel_chart, seams, count, &f->stitch, error));
+    LX_TRY(lx_finished_extend(bake->finished, lx_stitch_texels(f->stitch), lx_stitch_texel_count(f->stitch), error));
+    f->entry_count = lx_finished_count(bake->finished);
+cleanup:
+    lx_free(seams);
+    return result;
+}
+
+lx_result lx_finish_open(const lx_bake_job *job, lx_finish **out_finish, lx_error *error)
 {
     lx_result result = LX_OK;
-    lx_pool *pool = job->bake->scene->context->pool;
-    const uint32_t workers = lx_pool_worker_count(pool);
-    finish_job f = {.job = job, .direct = direct, .indirect = indirect, .first_layer = first_layer, .luxel_count = job->map.view.count};
-    f.scratch = lx_calloc_array(workers, sizeof *f.scratch);
-    if (!f.scratch) return lx_fail_memory(error, "layers");
-    const bool denoise = job->bake->desc.denoise == LX_DENOISE_BUILTIN;
-    if (denoise) LX_TRY(lx_denoise_graph_create(&job->map.view, can_step, (void *)job, pool, &f.graph, error));
+    lx_finish *f = lx_calloc_array(1, sizeof *f);
+    if (!f) return lx_fail_memory(error, "layers");
+    f->job = job;
+    LX_TRY(open_denoiser(f, error));
+    LX_TRY(open_stitch(f, error));
+    *out_finish = f;
+    f = NULL;
+cleanup:
+    lx_finish_close(f);
+    return result;
+}
+
+void lx_finish_close(lx_finish *f)
+{
+    if (!f) return;
+    lx_denoise_graph_destroy(f->graph);
+    lx_oidn_close(f->oidn);
+    lx_free(f->shown);
+    lx_stitch_destroy(f->stitch);
+    lx_free(f);
+}
+
+static lx_result finish_layer(void *user, size_t task, uint32_t worker, lx_error *error)
+{
+    const layers_job *j = user;
+    const lx_finish *f = j->finish;
+    const layer_scratch *s = &j->scratch[worker];
+    const lx_luxel_map *map = &f->job->map.view;
+    const lx_estimate *direct = j->direct + task * map->count, *indirect = j->indirect + task * map->count;
+    if (f->graph) {
+        lx_denoise_layer(f->graph, direct, s->denoise, s->light);
+        lx_denoise_layer(f->graph, indirect, s->denoise, s->indirect);
+        for (uint32_t i = 0; i < map->count; ++i) s->light[i] = lx_rgb_add(s->light[i], s->indirect[i]);
+    } else {
+        for (uint32_t i = 0; i < map->count; ++i) s->light[i] = lx_rgb_add(direct[i].mean, indirect[i].mean);
+    }
+    if (f->oidn) {
+        const lx_result result = lx_oidn_denoise(f->oidn, map, f->shown, s->light, error);
+        if (result != LX_OK) return result;
+    }
+    lx_stitch_apply(f->stitch, s->light, s->stitch);
+    return lx_finished_write(f->job->bake->finished, j->first_layer + (uint32_t)task, 0, f->entry_count, s->light, error);
+}
+
+lx_result lx_finish_layers(lx_finish *f, const lx_estimate *direct, const lx_estimate *indirect, uint32_t first_layer, uint32_t layer_count,
+                           lx_error *error)
+{
+    lx_result result = LX_OK;
+    lx_pool *pool = f->job->bake->scene->context->pool;
+    const uint32_t workers = lx_pool_worker_count(pool), luxels = f->job->map.view.count;
+    layers_job j = {.finish = f, .direct = direct, .indirect = indirect, .first_layer = first_layer};
+    j.scratch = lx_calloc_array(workers, sizeof *j.scratch);
+    if (!j.scratch) return lx_fail_memory(error, "layers");
     for (uint32_t i = 0; i < workers; ++i) {
-        struct finish_scratch *s = &f.scratch[i];
-        s->direct = lx_malloc_array(f.luxel_count, sizeof *s->direct);
-        s->indirect = denoise ? lx_malloc_array(f.luxel_count, sizeof *s->indirect) : NULL;
-        s->denoise = denoise ? lx_malloc_array(1, lx_denoise_scratch_bytes(f.graph)) : NULL;
-        if (!s->direct || (denoise && (!s->indirect || !s->denoise))) {
+        layer_scratch *s = &j.scratch[i];
+        s->light = lx_malloc_array(f->entry_count, sizeof *s->light);
+        s->indirect = f->graph ? lx_malloc_array(luxels, sizeof *s->indirect) : NULL;
+        s->denoise = f->graph ? lx_malloc_array(1, lx_denoise_scratch_bytes(f->graph)) : NULL;
+        s->stitch = lx_malloc_array(1, lx_stitch_scratch_bytes(f->stitch));
+        if (!s->light || !s->stitch || (f->graph && (!s->indirect || !s->denoise))) {
             result = lx_fail_memory(error, "denoising");
             goto cleanup;
         }
     }
-    LX_TRY(lx_pool_run(pool, layer_count, finish_layer, &f, "denoise", job->progress, error));
+    LX_TRY(lx_pool_run(pool, layer_count, finish_layer, &j, "denoise", f->job->progress, error));
 cleanup:
     for (uint32_t i = 0; i < workers; ++i) {
-        lx_free(f.scratch[i].direct);
-        lx_free(f.scratch[i].indirect);
-        lx_free(f.scratch[i].denoise);
+        void *arrays[] = {j.scratch[i].light, j.scratch[i].indirect, j.scratch[i].denoise, j.scratch[i].stitch};
+        for (size_t k = 0; k < sizeof arrays / sizeof *arrays; ++k) lx_free(arrays[k]);
     }
-    lx_free(f.scratch);
-    lx_denoise_graph_destroy(f.graph);
+    lx_free(j.scratch);
     return result;
 }

@@ -32,7 +32,7 @@ enum {
     most_passes = 1000,
 };
 
-static const float near_texels = 2.0f, pass_near_texels = 1.0f;
+static const float near_texels = 1.0f, pass_near_texels = 1.0f;
 static const double enough_energy = 1e-3; // of a layer's: what later bounces may still have added
 static const float darkest = 0.01f;      // of a layer's mean: below it errors count as if the texel were that bright
 static const uint32_t cache_stream = 0x63616368;
@@ -190,7 +190,10 @@ static lx_result light_tile(void *user, size_t task, uint32_t worker, lx_error *
     list_luxels(g, tile, s);
     for (uint32_t i = 0; i < s->count; ++i) place_sites(g, s, i, 0, lx_site_count, s->sites + (size_t)i * lx_site_count);
     memset(s->sums, 0, sizeof(float) * g->stride * s->count);
-    const lx_direct_tile direct = {.count = s->count, .place = s->place, .chart = s->chart, .stream = s->stream, .sites = s->sites};
+    lx_direct_bounds bounds;
+    lx_direct_tile direct = {.count = s->count, .place = s->place, .chart = s->chart, .stream = s->stream, .sites = s->sites};
+    lx_direct_find_bounds(&direct, &bounds);
+    direct.bounds = &bounds;
     const lx_direct_settings settings = {.tracer = g->bake->tracer, .samples = (desc->samples + lx_direct_sites - 1) / lx_direct_sites * lx_direct_sites};
     const bool bounces = g->settings.bounces > 0;
     for (uint32_t source = 0; source < g->bake->source_count; ++source) {
@@ -487,7 +490,8 @@ static void find_layer_means(gather_job *g)
     }
 }
 
-static lx_result run_rounds(gather_job *g, double start, lx_error *error)
+// Rounds that would end after `deadline` (lx_seconds) are not begun.
+static lx_result run_rounds(gather_job *g, double deadline, lx_error *error)
 {
     lx_result result = LX_OK;
     lx_bake_job *job = g->job;
@@ -506,7 +510,7 @@ static lx_result run_rounds(gather_job *g, double start, lx_error *error)
         }
         if (desc->noise > 0) LX_TRY(lx_pool_run(pool, job->map.tile_count, judge_tile, g, "gather", job->progress, error));
         const double now = lx_seconds(), next = (now - round_start) * (double)done / (double)g->round_count;
-        if (desc->time_s > 0 && now + next - start > desc->time_s) break;
+        if (desc->time_s > 0 && now + next > deadline) break;
         bool all = true;
         for (uint32_t t = 0; t < job->map.tile_count; ++t) all &= g->tiles[t].done;
         if (all) break;
@@ -684,7 +688,8 @@ static lx_result choose_answers(gather_job *g, lx_error *error)
 }
 
 // Bakes layers first … first + count - 1. `uses`: [source_count] room for their uses.
-static lx_result bake_group(lx_bake_job *job, uint32_t first, uint32_t count, lx_source_use *uses, sum_estimate *sums, double start, lx_error *error)
+static lx_result bake_group(lx_bake_job *job, uint32_t first, uint32_t count, lx_source_use *uses, sum_estimate *sums, lx_finish *finish,
+                            double deadline, lx_error *error)
 {
     lx_result result = LX_OK;
     lx_bake *bake = job->bake;
@@ -720,11 +725,11 @@ static lx_result bake_group(lx_bake_job *job, uint32_t first, uint32_t count, lx
         g.settings.rows = g.rows[0];
         g.settings.rows_later = bounces > 1 ? g.rows[1] : NULL;
     }
-    LX_TRY(run_rounds(&g, start, error));
+    LX_TRY(run_rounds(&g, deadline, error));
     job->stages.gather += lx_lap(&stage_start);
     add_to_sums(&g);
     release_cache(&g, workers);
-    LX_TRY(lx_bake_finish_layers(job, g.direct, g.indirect, first, count, error));
+    LX_TRY(lx_finish_layers(finish, g.direct, g.indirect, first, count, error));
     job->stages.denoise += lx_lap(&stage_start);
 cleanup:
     release_cache(&g, workers);
@@ -739,6 +744,7 @@ lx_result lx_bake_by_gathering(lx_bake_job *job, lx_error *error)
     lx_bake *bake = job->bake;
     lx_source_use *uses = lx_calloc_array(bake->source_count, sizeof *uses);
     sum_estimate *sums = lx_calloc_array(job->map.view.count, sizeof *sums);
+    lx_finish *finish = NULL;
     if (!uses || !sums) {
         result = lx_fail_memory(error, "layers");
         goto cleanup;
@@ -746,13 +752,16 @@ lx_result lx_bake_by_gathering(lx_bake_job *job, lx_error *error)
     lx_memory_plan plan;
     LX_TRY(lx_memory_plan_make(job, &plan, error));
     job->predicted_bytes = plan.peak_bytes;
+    LX_TRY(lx_finish_open(job, &finish, error));
     for (uint32_t first = 0; first < bake->layer_count; ++job->group_count) {
         const uint32_t count = lx_memory_group(bake, &plan, first);
-        LX_TRY(bake_group(job, first, count, uses, sums, start, error));
+        const double share = (double)(first + count) / bake->layer_count; // of the time that all groups have
+        LX_TRY(bake_group(job, first, count, uses, sums, finish, start + share * bake->desc.time_s, error));
         first += count;
     }
     job->noise = estimate_noise(job, sums);
 cleanup:
+    lx_finish_close(finish);
     lx_free(uses);
     lx_free(sums);
     return result;

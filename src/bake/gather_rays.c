@@ -286,7 +286,7 @@ static float roulette(const vertex_record *v, uint32_t key, float brings, float 
 
 static bool sample_light(const lx_gather_settings *settings, uint32_t source, const vertex_record *v, lx_ray *ray, lx_rgb *light, uint32_t *cell)
 {
-    enum { scale_factor = 20 }; // source_scales are a twentieth of the mean
+    enum { scale_factor = 100 }; // source_scales are a twentieth of the mean
     const lx_tracer *tracer = settings->tracer;
     const uint32_t key = lx_hash_combine(tracer->source_keys[source], gather_key + v->number);
     const float bound = lx_source_bound(tracer, source, &v->receiver), scale = scale_factor * tracer->source_scales[source];

@@ -130,7 +130,7 @@ static void make_pilots(const work *w)
     }
 }
 
-// How far two values may be taken for one: 1 where their variances explain the difference, towards 0 beyond. [Rousselle2012] eq. 3 for a patch of
+// How far two values may be taken for one: 1 where their variances explain the difference, towards 0 beyond. [Rousselle2012], for a patch of
 // one: what noise alone explains counts as no difference. Instead of exp(-x): 1 / (1 + x)².
 static float likeness(pilot a, pilot b)
 {
@@ -140,7 +140,7 @@ static float likeness(pilot a, pilot b)
     return share * share;
 }
 
-// One level of the wavelet: [Schied2017] eq. 2 with the function above; variances go with the squares of the weights (eq. 3).
+// One level of the wavelet: [Schied2017] with the function above; variances go with the squares of the weights.
 static void filter_level(const work *w, int level)
 {
     const lx_estimate *in = w->levels[level];
@@ -166,7 +166,7 @@ static void filter_level(const work *w, int level)
     }
 }
 
-// Stein's estimate of a candidate's squared error, [Li2012] eq. 5: (F - x)² - v + 2 v dF/dx. The derivative is the weight of the luxel itself in its
+// Stein's estimate of a candidate's squared error, [Li2012]: (F - x)² - v + 2 v dF/dx. The derivative is the weight of the luxel itself in its
 // result; a kernel near a Gaussian gives twice the sum of its squared weights, which the variances tell, and one that is all there is gives 1.
 static void estimate_errors(const work *w)
 {

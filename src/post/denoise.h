@@ -6,9 +6,9 @@
 /// input stays.
 ///
 /// Based on: [Dammertz2010] "Edge-Avoiding À-Trous Wavelet Transform for fast Global Illumination Filtering"; [Schied2017] "Spatiotemporal
-/// Variance-Guided Filtering", 4.4 (stopping function on variance that is filtered along); [Rousselle2012] "Adaptive Rendering with Non-Local
-/// Means Filtering", eq. 3 (differences less what noise explains); [Li2012] "SURE-based Optimization for Adaptive Sampling and
-/// Reconstruction", 4 (choice among filters by Stein's unbiased estimate of their error).
+/// Variance-Guided Filtering" (a stopping function on variance that is filtered along); [Rousselle2012] "Adaptive Rendering with Non-Local
+/// Means Filtering" (differences less what noise explains); [Li2012] "SURE-based Optimization for Adaptive Sampling and
+/// Reconstruction" (choice among filters by Stein's unbiased estimate of their error).
 ///
 /// Use:
 ///     lx_denoise_graph_create(map, can_step, user, pool, &graph, error);            // once, for all layers

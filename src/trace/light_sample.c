@@ -3,7 +3,7 @@
 // Lamps (point, spot, directional, rectangle, disk) are invisible to rays, so their samples carry the whole weight. Emissive surfaces
 // and sky pictures can also be hit; samples and hits share the weight by the power heuristic of Veach 1997, section 9.2.4.
 // Rectangles are sampled by solid angle ([Urena2013]); disks through their bounding square, points outside it count 0, which keeps the
-// density bounded right up to the disk. Spheres by their visible cap ([PBR4] 6.2.4).
+// density bounded right up to the disk. From far away both are sampled by area. Spheres by their visible cap ([PBR4] 6.2.4).
 #include "trace/light_sample.h"
 
 #include "trace/sampling.h"
@@ -23,6 +23,9 @@ float lx_spot_factor(const lx_light *light, float cosine)
     const float attenuation = lx_clamp((cosine - cos_outer) * scale, 0, 1);
     return attenuation * attenuation;
 }
+
+// Half diagonals from which a rectangle is sampled by area: cosine and distance differ by less than a sixth over it.
+static const float areas_do_from = 12;
 
 static float power_heuristic(float pdf_a, float pdf_b)
 {
@@ -123,24 +126,27 @@ static bool sample_area(const lx_light *light, const lx_receiver *r, lx_vec2 u, 
     if (!(half_width > 0) || !(half_depth > 0)) return false;
     const lx_vec3 x = lx_scale(light->axis_x, 1 / half_width), y = lx_scale(light->axis_y, 1 / half_depth);
     const lx_vec3 corner = {lx_dot(to_centre, x) - half_width, lx_dot(to_centre, y) - half_depth, height};
-    const lx_spherical_rectangle rectangle = lx_spherical_rectangle_of(corner, 2 * half_width, 2 * half_depth);
     lx_vec2 place; // on the lamp, from its centre, in half edges
     float density; // 1 / pdf_solid_angle, without the cosine at the lamp when sampled by area
-    if (rectangle.solid_angle > 1e-4) {
+    lx_spherical_rectangle rectangle = {.solid_angle = 0};
+    const float near2 = areas_do_from * areas_do_from * (half_width * half_width + half_depth * half_depth);
+    if (lx_dot(to_centre, to_centre) < near2) rectangle = lx_spherical_rectangle_of(corner, 2 * half_width, 2 * half_depth);
+    if (rectangle.solid_angle > 1e-4f) {
         const lx_vec3 p = lx_sample_spherical_rectangle(&rectangle, u);
         place = (lx_vec2){(p.x - corner.x) / half_width - 1, (p.y - corner.y) / half_depth - 1};
-        density = (float)rectangle.solid_angle;
-    } else { // too small for the angles' precision, and far enough for areas to do as well
-        place = (lx_vec2){2 * u.x - 1, 2 * u.y - 1};
+        density = rectangle.solid_angle;
+    } else { // far enough for areas to do as well, or too small for the angles' precision
+        place = light->kind == LX_LIGHT_DISK ? lx_sample_disk(u) : (lx_vec2){2 * u.x - 1, 2 * u.y - 1};
         density = 0;
     }
-    if (light->kind == LX_LIGHT_DISK && lx_dot2(place, place) > 1) return false;
+    if (light->kind == LX_LIGHT_DISK && density > 0 && lx_dot2(place, place) > 1) return false;
     const lx_vec3 target =
         lx_add(light->position, lx_add(lx_scale(light->axis_x, place.x), lx_scale(light->axis_y, place.y)));
     const lx_vec3 to_target = lx_sub(target, r->position);
     const float distance = lx_length(to_target);
     const lx_vec3 direction = lx_scale(to_target, 1 / distance);
-    if (density == 0) density = 4 * half_width * half_depth * (height / distance) / (distance * distance);
+    const float unit_area = light->kind == LX_LIGHT_DISK ? LX_PI : 4; // of half edges 1
+    if (density == 0) density = unit_area * half_width * half_depth * (height / distance) / (distance * distance);
     *irradiance = factor * receiver_cosine(r, direction) * density;
     if (*irradiance == 0) return false;
     *ray = ray_to_point(r, target);

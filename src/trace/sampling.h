@@ -58,15 +58,16 @@ static inline lx_vec2 lx_sample_triangle(lx_vec2 u)
 /// A rectangle as seen from a point: what [Urena2013] needs to sample it by solid angle. Double precision: for small rectangles the four
 /// dihedral angles all but cancel.
 typedef struct lx_spherical_rectangle {
-    double solid_angle;
-    double x0, y0, x1, y1, z0;
-    double b0, b1, k;
+    float solid_angle;
+    double x0, y0, x1, y1, z;
+    double b0, b0_rest, b1;  ///< b0_rest: 1 - b0², to full precision.
+    double cos_k, sin_k;
 } lx_spherical_rectangle;
 
 /// `corner` is the lower left corner relative to the viewer in a frame whose axes are the edges' unit directions and their cross product.
 lx_spherical_rectangle lx_spherical_rectangle_of(lx_vec3 corner, float width, float height);
 
-/// Point on the rectangle, same frame, relative to the viewer. pdf_solid_angle = 1 / solid_angle.
+/// Point on the rectangle, same frame, relative to the viewer, z towards the viewer's negative side. pdf_solid_angle = 1 / solid_angle.
 lx_vec3 lx_sample_spherical_rectangle(const lx_spherical_rectangle *r, lx_vec2 u);
 
 #endif

@@ -19,7 +19,7 @@ import time
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
-from harness import case, CASES, Failed, expect, luxel, main, read, refused, start, tree, write
+from harness import case, CASES, Failed, expect, luxel, main, read, refused, sanitized, start, tree, write
 import scenes
 import web_cases  # registers its own
 from gltf import png
@@ -304,6 +304,36 @@ def bake_says_how_it_was_baked():
         expect((summary["noise"] is None) == (integrator == "path") == ("noise" not in manifest), result.out)
         page = read("room.baked/report.html").decode()
         expect(("noise, estimated" in page) == (integrator == "gather") and "<td>%s</td>" % integrator in page, "the report does not say it")
+
+
+@case
+def bake_stays_below_the_memory_it_is_given():
+    write("shop.glb", scenes.lamp_shop().to_bytes())
+    options = ("--page-size", "224", "--samples", "1", "--quiet", "--json", "--integrator", "gather")
+    free = json.loads(luxel("bake", "shop.glb", "-o", "free.baked", *options).out)
+    expect(free["groups"] == 1 and free["layers"] == 40, "%s groups, %s layers" % (free["groups"], free["layers"]))
+    # What a bake needs besides its layers is about the same with and without a limit: three quarters of the layers must go.
+    spare = free["texels"] * 30 * (32 + 18)
+    limit = free["predicted_memory_bytes"] - spare
+    kept = json.loads(luxel("bake", "shop.glb", "-o", "kept.baked", *options, "--memory", str(limit)).out)
+    expect(3 <= kept["groups"] <= 8, "%d groups" % kept["groups"])
+    for name in ("luxel.pack", "scene.glb", "preview.png"):
+        expect(read("free.baked/" + name) == read("kept.baked/" + name), name + " differs")
+    expect(abs(kept["noise"] - free["noise"]) < 0.01 * free["noise"], "noise is %g, %g without groups" % (kept["noise"], free["noise"]))
+    left = [name for name in os.listdir(".") if name not in ("shop.glb", "free.baked", "kept.baked")]
+    expect(not left, "left behind: %s" % left)
+    if not sanitized():  # they have memory of their own
+        expect(kept["peak_memory_bytes"] <= limit, "%d bytes at most, not %d" % (limit, kept["peak_memory_bytes"]))
+        for summary in (free, kept):
+            ratio = summary["predicted_memory_bytes"] / summary["peak_memory_bytes"]
+            expect(0.95 < ratio < 1.25, "predicted %.2f of the peak" % ratio)
+
+
+@case
+def bake_tells_the_memory_it_needs_at_least():
+    write("room.glb", scenes.GOOD)
+    refused("bake", "room.glb", "-o", "room.baked", *FAST, "--integrator", "gather", "--memory", "1M", code=1, says=["1 MiB of memory are not enough", "need * MiB"])
+    expect(os.listdir(".") == ["room.glb"], "left behind: %s" % os.listdir("."))
 
 
 @case

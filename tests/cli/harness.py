@@ -102,6 +102,11 @@ def read(path):
         return file.read()
 
 
+def sanitized():
+    """Is the program built with a sanitizer?"""
+    return b"__asan_init" in read(PROGRAM) or b"__tsan_init" in read(PROGRAM)
+
+
 def main():
     global PROGRAM
     if sys.argv[1:] == ["--list"]:

@@ -39,6 +39,14 @@ def living_room(monitor="4x2"):
     return g
 
 
+def lamp_shop():
+    """The living room with so many lamps that layers are what a bake needs memory for: 40 of them, 8 those of a monitor."""
+    g = living_room()
+    for i in range(29):
+        g.add_node("shop %d" % i, light=g.add_light("point", 1 + i % 3, (1, 0.5, 0.2), "shop %d" % i), translation=(0.06 * i - 0.9, 0.9, 0.9 - 0.06 * i))
+    return g
+
+
 def edited(change):
     """The room with its JSON changed by `change(json)`."""
     g = room()

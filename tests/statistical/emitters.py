@@ -4,7 +4,7 @@ import math
 import random
 
 import oracle
-from gltf import Gltf, grid, quad, quat, quat_rotate, sphere, v_add, v_dot, v_len, v_mul, v_norm, v_sub
+from gltf import Gltf, box, grid, quad, quat, quat_rotate, sphere, v_add, v_dot, v_len, v_mul, v_norm, v_sub
 from lamps import COLOR, DOWN, direction, node, receivers
 from measure import case, compare, compare_mean, grey, irradiance, times
 
@@ -91,6 +91,15 @@ def emissive_mesh_of_many_triangles_equals_one_rectangle():
     points, expected = worth_comparing(points, lambert(world_triangles(quad(2, 1), place, turn), points), 0.005)
     got = irradiance(panel(grid(2, 1, 37, 5), place, turn), points, 16384, 0)
     compare("370 triangles", times_pi(expected), got, 0.01, 16384)
+
+
+@case
+def emissive_bar_close_by_meets_the_sum_over_its_triangles():
+    # Long and thin: what is near and faces the point gives most of the light, wherever along the bar the point lies.
+    shape = box(6, 0.1, 0.1)
+    points = [((x, y, z), v_norm((0.2, -y, -z))) for x in (-2.8, -1, 0.3, 2.5, 3.4) for y, z in ((0.15, 0), (0.1, -0.3), (-0.5, 0.6))]
+    got = irradiance(panel(shape), points, 16384, 0)
+    compare("12 triangles", times_pi(lambert(world_triangles(shape), points)), got, 0.01, 16384)
 
 
 @case

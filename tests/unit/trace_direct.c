@@ -4,7 +4,7 @@
 #include "math/hash.h"
 #include "unit/scene_fixture.h"
 
-enum { edge = 6, luxels = edge * edge, samples = 64, brute_samples = 16 * 400, most_cells = 6 };
+enum { edge = 10, luxels = edge * edge, samples = 64, brute_samples = 16 * 200, most_cells = 6 };
 
 // Two squares, one of them with texture coordinates (a monitor needs them); a lamp of every kind above or beside the tile.
 static const char members[] =
@@ -57,8 +57,8 @@ static void begin(fixture *f, uint32_t seed)
         f->place[i] = (uint16_t)(i / edge * 32 + i % edge);
         f->stream[i] = lx_hash_combine(seed, i);
         for (uint32_t s = 0; s < lx_direct_sites; ++s) { // 4 × 4 in luxels of 0.4 m
-            const float x = ((float)(i % edge) + ((float)(s % 4) + 0.5f) / 4) * 0.4f - 1.2f;
-            const float z = ((float)(i / edge) + ((float)(s / 4) + 0.5f) / 4) * 0.4f - 1.2f;
+            const float x = ((float)(i % edge) + ((float)(s % 4) + 0.5f) / 4) * 0.4f - 2;
+            const float z = ((float)(i / edge) + ((float)(s / 4) + 0.5f) / 4) * 0.4f - 2;
             f->sites[i * lx_direct_sites + s] = (lx_receiver){.position = {x, 0, z}, .normal = {0, 1, 0}, .geometric_normal = {0, 1, 0}};
         }
     }

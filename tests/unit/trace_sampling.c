@@ -102,7 +102,7 @@ static void spherical_rectangle_knows_its_solid_angle_and_samples_it_evenly(void
         const float *c = cases[k];
         const lx_spherical_rectangle r = lx_spherical_rectangle_of((lx_vec3){c[0], c[1], c[4]}, c[2], c[3]);
         const double exact = solid_angle_by_corners((double)c[0], (double)c[1], (double)(c[0] + c[2]), (double)(c[1] + c[3]), (double)c[4]);
-        assert_true(fabs(r.solid_angle - exact) < 1e-9 + 1e-6 * exact);
+        assert_true(fabs((double)r.solid_angle - exact) < 1e-9 + 1e-6 * exact);
         // Counts by the inverse of the map: share of solid angle left of the sample, and below it within its line.
         uint32_t counts[cell_count] = {0};
         for (uint32_t i = 0; i < sample_count; ++i) {
