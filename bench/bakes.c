@@ -15,7 +15,6 @@
 #include "bake/luxels.h"
 #include "base/clock.h"
 #include "base/error.h"
-#include "base/thread.h"
 #include "image/image.h"
 #include "math/hash.h"
 
@@ -23,12 +22,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { most_bakes = 64, most_stages = 16 };
-
-typedef struct stage_time {
-    const char *name; // NULL: no more
-    double seconds;
-} stage_time;
+enum { most_bakes = 64 };
 
 typedef struct entry {
     const char *exr;  // NULL: a bake
@@ -36,8 +30,7 @@ typedef struct entry {
     lx_bake_desc desc;
     uint32_t salt;
     float *sum;       // [texel of all pages][channel]
-    lx_bake_summary best; // of all rounds, with the times of its stages
-    stage_time stages[most_stages];
+    lx_bake_summary best; // of all rounds
     double total_seconds;
     uint32_t runs;
 } entry;
@@ -56,7 +49,6 @@ typedef struct bench {
 // ---- what the linker puts between ------------------------------------------------------------------------------------------
 
 static uint32_t salt;           // of the bake at work
-static stage_time stages[most_stages]; // likewise
 static uint8_t *valid_now;      // [texel of all pages] of the bake at work
 static size_t page_texels_now;
 
@@ -80,38 +72,6 @@ void __wrap_lx_path_trace(lx_path_batch *batch, const lx_path_settings *settings
         salted[i].stream = lx_hash_combine(starts[i].stream, salt);
     }
     __real_lx_path_trace(batch, settings, salted, count, sums, back_hits);
-}
-
-lx_result __real_lx_pool_run(lx_pool *pool, size_t count, lx_task task, void *user, const char *stage, const lx_progress_sink *sink, lx_error *error);
-lx_result __wrap_lx_pool_run(lx_pool *pool, size_t count, lx_task task, void *user, const char *stage, const lx_progress_sink *sink, lx_error *error);
-lx_result __real_lx_pool_run_weighted(lx_pool *pool, size_t count, const float *weights, lx_task task, void *user, const char *stage,
-                                      const lx_progress_sink *sink, lx_error *error);
-lx_result __wrap_lx_pool_run_weighted(lx_pool *pool, size_t count, const float *weights, lx_task task, void *user, const char *stage,
-                                      const lx_progress_sink *sink, lx_error *error);
-
-static void add_stage(const char *name, double seconds)
-{
-    uint32_t k = 0;
-    while (k < most_stages - 1 && stages[k].name && strcmp(stages[k].name, name) != 0) ++k;
-    stages[k].name = name;
-    stages[k].seconds += seconds;
-}
-
-lx_result __wrap_lx_pool_run(lx_pool *pool, size_t count, lx_task task, void *user, const char *stage, const lx_progress_sink *sink, lx_error *error)
-{
-    const double start = lx_seconds();
-    const lx_result result = __real_lx_pool_run(pool, count, task, user, stage, sink, error);
-    add_stage(stage, lx_seconds() - start);
-    return result;
-}
-
-lx_result __wrap_lx_pool_run_weighted(lx_pool *pool, size_t count, const float *weights, lx_task task, void *user, const char *stage,
-                                      const lx_progress_sink *sink, lx_error *error)
-{
-    const double start = lx_seconds();
-    const lx_result result = __real_lx_pool_run_weighted(pool, count, weights, task, user, stage, sink, error);
-    add_stage(stage, lx_seconds() - start);
-    return result;
 }
 
 // The last moment at which a bake knows which texels lie inside solid geometry.
@@ -165,6 +125,8 @@ static void apply_setting(entry *e, const char *item)
         d->direct_only = value[0] == '1';
     else if (is_setting(item, "indirect_only", &value))
         d->indirect_only = value[0] == '1';
+    else if (is_setting(item, "time", &value))
+        d->time_s = strtod(value, NULL);
     else if (is_setting(item, "salt", &value))
         e->salt = (uint32_t)strtoul(value, NULL, 10);
     else if (is_setting(item, "scale", &value))
@@ -226,7 +188,6 @@ static lx_result bake_once(bench *b, entry *e, lx_error *error)
     lx_bake *bake = NULL;
     uint8_t *valid = NULL;
     salt = e->salt;
-    memset(stages, 0, sizeof stages);
     lx_result result = lx_bake_create(b->scene, b->atlas, &e->desc, &bake, error);
     if (result != LX_OK) return result;
     valid = malloc(b->texel_count);
@@ -243,10 +204,7 @@ static lx_result bake_once(bench *b, entry *e, lx_error *error)
         add_layers(b, bake, e->sum);
         mark_interior(b, bake, valid, b->counts);
     }
-    if (e->runs == 0 || summary.seconds < e->best.seconds) {
-        e->best = summary;
-        memcpy(e->stages, stages, sizeof stages);
-    }
+    if (e->runs == 0 || summary.seconds < e->best.seconds) e->best = summary;
     e->total_seconds += summary.seconds;
     ++e->runs;
 cleanup:
@@ -308,18 +266,18 @@ static void print(const bench *b)
     printf("{\"page_size\": %u, \"pages\": %u, \"compared_texels\": %zu, \"bakes\": [", b->atlas->page_size, b->atlas->page_count, count);
     for (uint32_t k = 0; k < b->entry_count; ++k) {
         const entry *e = &b->entries[k];
+        const lx_stage_seconds *t = &e->best.stages;
         double mean = 0;
         for (size_t i = 0; i < 3 * b->texel_count; ++i) mean += b->counts[i / 3] ? (double)e->sum[i] : 0;
         printf("%s\n  {\"mean\": %.9g", k ? "," : "", mean / (3 * (double)(count ? count : 1)));
         if (!e->exr)
             printf(", \"seconds\": %.4f, \"mean_seconds\": %.4f, \"layers\": %u, "
-                   "\"texels\": %llu, \"invalid\": %llu, \"rays\": %llu, \"noise\": %.6g, \"stages\": {",
+                   "\"texels\": %llu, \"invalid\": %llu, \"rays\": %llu, \"noise\": %.6g, \"luxels_s\": %.4f, \"bake_s\": %.4f, \"post_s\": %.4f, "
+                   "\"direct_s\": %.4f, \"cache_s\": %.4f, \"gather_s\": %.4f, \"denoise_s\": %.4f",
                    e->best.seconds, e->total_seconds / e->runs, e->best.layer_count,
                    (unsigned long long)e->best.texel_count, (unsigned long long)e->best.invalid_count, (unsigned long long)e->best.ray_count,
-                   (double)e->best.noise);
-        for (uint32_t s = 0; s < most_stages && e->stages[s].name; ++s)
-            printf("%s\"%s\": %.4f", s ? ", " : "", e->stages[s].name, e->stages[s].seconds);
-        printf(e->exr ? "}" : "}}");
+                   (double)e->best.noise, t->luxels, t->bake, t->post, t->direct, t->cache, t->gather, t->denoise);
+        printf("}");
     }
     printf("],\n \"products\": [");
     for (uint32_t i = 0; i < b->entry_count; ++i) {

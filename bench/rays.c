@@ -60,7 +60,7 @@ void __wrap_lx_accel_transmittance(const lx_accel *accel, const lx_ray *rays, lx
 
 static double enter(const char *stage)
 {
-    in_stage = strcmp(stage, stage_name) == 0;
+    in_stage = stage && strcmp(stage, stage_name) == 0;
     return lx_seconds();
 }
 

@@ -1,4 +1,4 @@
-"""A room of some ten thousand triangles with 16 lamps of four kinds, written to the path given: python3 bench/room16.py OUT.glb"""
+"""A room of some ten thousand triangles with 16 lamps of four kinds, or more, written to the path given: python3 bench/room16.py OUT.glb [LAMPS]"""
 
 import math
 import os
@@ -8,7 +8,9 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 from gltf import Gltf, box, look, quad, sphere  # noqa: E402
 
 
-def build():
+def build(lamps=16):
+    columns = 4 if lamps == 16 else math.ceil(math.sqrt(lamps))
+    step_x, step_z = 7.8 / (columns - 1), 6 / (columns - 1)
     g = Gltf(generator="luxel bench/room16.py")
     grey = g.add_material("walls", base_color=(0.7, 0.68, 0.65))
     red = g.add_material("things", base_color=(0.6, 0.2, 0.15))
@@ -20,9 +22,9 @@ def build():
         g.add_node("ball_%d" % i, mesh=ball, translation=(x, 0.36, math.sin(2.1 * i) * 2.5))
         g.add_node("post_%d" % i, mesh=post, translation=(x + 0.8, 0.81, math.cos(1.7 * i) * 2.5))
     lamp = g.add_mesh("lamp", (quad(0.5, 0.5), g.add_material("glow", base_color=(0.1, 0.1, 0.1), emissive=(1, 1, 1), strength=60)))
-    for i in range(16):
-        at = (-4 + 2.6 * (i % 4), 2.8, -3 + 2 * (i // 4))
-        color = (1, 0.6 + 0.1 * (i % 4), 0.4 + 0.15 * (i // 4))
+    for i in range(lamps):
+        at = (-4 + step_x * (i % columns), 2.8, -3 + step_z * (i // columns))
+        color = (1, 0.6 + 0.1 * (i % 4), 0.4 + 0.15 * (i // columns % 4))
         down = look(at, (at[0], 0, at[2]))
         kind = i % 4
         if kind == 0:
@@ -38,4 +40,4 @@ def build():
 
 
 if __name__ == "__main__":
-    build().save(sys.argv[1])
+    build(int(sys.argv[2]) if len(sys.argv) > 2 else 16).save(sys.argv[1])
