@@ -210,7 +210,8 @@ static lx_result light_tile(void *user, size_t task, uint32_t worker, lx_error *
     lx_direct_tile direct = {.count = s->count, .place = s->place, .chart = s->chart, .stream = s->stream, .sites = s->sites};
     lx_direct_find_bounds(&direct, &bounds);
     direct.bounds = &bounds;
-    const lx_direct_settings settings = {.tracer = g->bake->tracer, .samples = (desc->samples + lx_direct_sites - 1) / lx_direct_sites * lx_direct_sites};
+    const lx_direct_settings settings = {.tracer = g->bake->tracer, .samples = (desc->samples + lx_direct_sites - 1) / lx_direct_sites * lx_direct_sites,
+                                         .noise = desc->noise};
     const bool bounces = g->settings.bounces > 0;
     for (uint32_t source = 0; source < g->bake->source_count; ++source) {
         const lx_source_use *use = &g->uses[source];
