@@ -109,7 +109,7 @@ lx_result lx_memory_plan_make(const lx_bake_job *job, const lx_finish *finish, l
     const double mib = 1.0 / (1 << 20);
     if (plan.peak_bytes == baking || plan.peak_bytes <= limit)
         return lx_fail(error, LX_ERROR_LIMIT, "%.0f MiB of memory are not enough: %u texels and %u layer%s at once need %.0f MiB; fewer or smaller pages need less",
-                       (double)limit * mib, job->map.view.count, least, least == 1 ? "" : "s, the cells of a monitor,", ceil((double)baking * 16 / 15 * mib));
+                       (double)limit * mib, job->map.view.count, least, least == 1 ? "" : "s, the cells of a monitor,", ceil((double)baking * 1.09 * mib)); // with room for the next run to differ a little
     return lx_fail(error, LX_ERROR_LIMIT, "%.0f MiB of memory are not enough: %s needs %.0f MiB", (double)limit * mib,
                    plan.peak_bytes == before ? "preparing" : "saving", (double)plan.peak_bytes * mib);
 }
