@@ -27,7 +27,7 @@ enum {
     chunk_luxels = 256,    // of a tile, whose sums are at work at a time
     first_round = 16,      // rays a luxel
     largest_round = 256,
-    rays_per_site = 4,     // in a round
+    rays_per_site = 8,     // in a round
     most_pass_rays = 32,
     most_passes = 1000,
 };

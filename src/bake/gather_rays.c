@@ -43,6 +43,8 @@ struct lx_gather_batch {
     lx_ray rays[batch_size];
     lx_hit hits[batch_size];
     float cosines[batch_size];
+    uint32_t streams[batch_size], samples[batch_size];
+    float x[batch_size], y[batch_size], z[batch_size]; // local directions
     pending pending[batch_size];
     uint32_t found[batch_size], found_target[batch_size];
     // The second loop; what arrives while it is full waits for its turn.
@@ -124,6 +126,30 @@ static void add_emission(const lx_gather_settings *settings, const lx_gather_out
     add_light(settings, out, f->target, use, cell, lx_rgb_scale(lx_rgb_mul(f->throughput, s->emission), LX_PI * weight));
 }
 
+// ---- directions -------------------------------------------------------------------------------------------------------------------
+
+// Sine and cosine of 2 pi t, t in [0, 1): Taylor series about the nearest quarter turn, within a few roundings; no branches and no calls, so that loops stay tight.
+static inline void sincos_of_turn(float t, float *sine, float *cosine)
+{
+    const int quarter = (int)(4 * t + 0.5f);
+    const float x = (t - 0.25f * (float)quarter) * (2 * LX_PI), x2 = x * x;
+    const float s = x * (1 - x2 * (1.0f / 6 - x2 * (1.0f / 120 - x2 * (1.0f / 5040 - x2 * (1.0f / 362880)))));
+    const float c = 1 - x2 * (0.5f - x2 * (1.0f / 24 - x2 * (1.0f / 720 - x2 * (1.0f / 40320))));
+    const bool odd = quarter & 1;
+    const float a = odd ? c : s, b = odd ? s : c;
+    *sine = quarter & 2 ? -a : a;
+    *cosine = (quarter + 1) & 2 ? -b : b;
+}
+
+// Cosine-weighted around +Z; pdf = cos(theta) / pi ([PBR4] A.5.3 on a disk in polar coordinates).
+static inline lx_vec3 cosine_direction(lx_vec2 u)
+{
+    float sine, cosine;
+    sincos_of_turn(u.y, &sine, &cosine);
+    const float radius = sqrtf(u.x);
+    return (lx_vec3){radius * cosine, radius * sine, sqrtf(1 - u.x)};
+}
+
 // ---- the first loop ----------------------------------------------------------------------------------------------------------------
 
 static void send(lx_gather_batch *b, const lx_ray *ray, const lx_hit *hit, const flight *f)
@@ -133,20 +159,60 @@ static void send(lx_gather_batch *b, const lx_ray *ray, const lx_hit *hit, const
     b->flights[b->slow_count++] = *f;
 }
 
+// Local directions of the first rays: [PBR4]'s cosine-weighted ones of a Sobol point each, in plain loops that compilers turn into vectors.
+static inline __attribute__((always_inline)) void make_directions(const uint32_t *restrict streams, const uint32_t *restrict samples, size_t count,
+                                                                  float *restrict x, float *restrict y, float *restrict z)
+{
+    for (size_t i = 0; i < count; ++i) {
+        const lx_vec3 d = cosine_direction(lx_sobol_pair(samples[i], dimension_key(streams[i], 0, dimension_bounce)));
+        x[i] = d.x;
+        y[i] = d.y;
+        z[i] = d.z;
+    }
+}
+
+#if defined(__x86_64__)
+__attribute__((target("avx2"))) static void make_directions_avx2(const uint32_t *streams, const uint32_t *samples, size_t count, float *x, float *y,
+                                                                 float *z)
+{
+    make_directions(streams, samples, count, x, y, z);
+}
+#endif
+
+static void find_directions(lx_gather_batch *b, size_t count)
+{
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx2")) {
+        make_directions_avx2(b->streams, b->samples, count, b->x, b->y, b->z);
+        return;
+    }
+#endif
+    make_directions(b->streams, b->samples, count, b->x, b->y, b->z);
+}
+
 // Rays from the starts; those below the geometric surface are dropped. Returns how many are left; b->found is the start of each.
 static size_t make_rays(lx_gather_batch *b, const lx_gather_start *starts, size_t count)
 {
-    size_t made = 0;
     for (size_t i = 0; i < count; ++i) {
-        const lx_gather_start *start = &starts[i];
-        const lx_vec2 u = lx_sobol_pair(start->sample, dimension_key(start->stream, 0, dimension_bounce));
-        const lx_vec3 local = lx_sample_cosine_hemisphere(u);
-        const lx_vec3 direction = lx_to_world(start->receiver->normal, local);
-        if (!(lx_dot(direction, start->receiver->geometric_normal) > 0)) continue;
-        b->rays[made] = (lx_ray){.origin = lx_offset_origin(start->receiver->position, start->receiver->geometric_normal), .direction = direction,
-                                 .t_max = INFINITY};
-        b->cosines[made] = local.z;
-        b->found[made++] = (uint32_t)i;
+        b->streams[i] = starts[i].stream;
+        b->samples[i] = starts[i].sample;
+    }
+    find_directions(b, count);
+    size_t made = 0;
+    const lx_receiver *last = NULL;
+    lx_vec3 tangent = {0, 0, 0}, bitangent = {0, 0, 0}, origin = {0, 0, 0};
+    for (size_t i = 0; i < count; ++i) {
+        const lx_receiver *r = starts[i].receiver;
+        if (r != last) { // several rays leave one site
+            lx_tangent_frame(r->normal, &tangent, &bitangent);
+            origin = lx_offset_origin(r->position, r->geometric_normal);
+            last = r;
+        }
+        const lx_vec3 direction = lx_add(lx_add(lx_scale(tangent, b->x[i]), lx_scale(bitangent, b->y[i])), lx_scale(r->normal, b->z[i]));
+        b->rays[made] = (lx_ray){.origin = origin, .direction = direction, .t_max = INFINITY};
+        b->cosines[made] = b->z[i];
+        b->found[made] = (uint32_t)i;
+        made += lx_dot(direction, r->geometric_normal) > 0;
     }
     return made;
 }
@@ -286,11 +352,15 @@ static float roulette(const vertex_record *v, uint32_t key, float brings, float 
 
 static bool sample_light(const lx_gather_settings *settings, uint32_t source, const vertex_record *v, lx_ray *ray, lx_rgb *light, uint32_t *cell)
 {
-    enum { scale_factor = 100 }; // source_scales are a twentieth of the mean
+    enum { scale_factor = 200 }; // source_scales are a twentieth of the mean
     const lx_tracer *tracer = settings->tracer;
     const uint32_t key = lx_hash_combine(tracer->source_keys[source], gather_key + v->number);
-    const float bound = lx_source_bound(tracer, source, &v->receiver), scale = scale_factor * tracer->source_scales[source];
+    const float scale = scale_factor * tracer->source_scales[source];
+    float bound = lx_source_bound(tracer, source, &v->receiver);
     if (bound == 0) return false;
+    // Within the sphere around a long tube or a string of bulbs: nothing is certain, but few places are much brighter than this.
+    const lx_source_sphere *sphere = &tracer->source_spheres[source];
+    if (!(bound < INFINITY) && sphere->power < INFINITY && sphere->radius > 0) bound = 4 * sphere->power / (sphere->radius * sphere->radius);
     const float brightness = lx_rgb_max(v->throughput);
     const float chance = roulette(v, key ^ 0x68bc21ebu, brightness * bound, scale);
     if (chance == 0) return false;
@@ -374,7 +444,7 @@ static lx_result step(lx_gather_batch *b, const lx_gather_settings *settings, co
     for (size_t i = 0; i < vertex_count; ++i) {
         const vertex_record *v = &b->vertices[i];
         const lx_vec2 u = lx_sobol_pair(v->sample, dimension_key(v->stream, v->number, dimension_bounce));
-        const lx_vec3 local = lx_sample_cosine_hemisphere(u);
+        const lx_vec3 local = cosine_direction(u);
         const lx_vec3 direction = lx_to_world(v->receiver.normal, local);
         if (!(lx_dot(direction, v->receiver.geometric_normal) > 0)) continue;
         b->slow_rays[kept] = (lx_ray){.origin = lx_offset_origin(v->receiver.position, v->receiver.geometric_normal), .direction = direction,
