@@ -243,8 +243,9 @@ lx_result lx_bake_run(lx_bake *bake, const lx_progress_sink *progress, lx_error 
     if (!job.pages) return lx_fail_memory(error, "luxels");
     lx_advise_on_scene(bake);
     LX_TRY(place_luxels(&job, error));
-    LX_TRY(lx_pool_run(pool, atlas->page_count, fill_page, &job, "luxels", progress, error));
     job.stages.luxels = lx_lap(&stage_start);
+    LX_TRY(lx_pool_run(pool, atlas->page_count, fill_page, &job, "padding", progress, error));
+    job.stages.post = lx_lap(&stage_start);
     if (bake->desc.integrator == LX_INTEGRATOR_PATH)
         LX_TRY(lx_bake_by_paths(&job, error));
     else

@@ -112,8 +112,8 @@ static lx_result finish_layer(void *user, size_t task, uint32_t worker, lx_error
     const lx_luxel_map *map = &f->job->map.view;
     const lx_estimate *direct = j->direct + task * map->count, *indirect = j->indirect + task * map->count;
     if (f->graph) {
-        lx_denoise_layer(f->graph, direct, s->denoise, s->light);
-        lx_denoise_layer(f->graph, indirect, s->denoise, s->indirect);
+        lx_denoise_layer(f->graph, lx_light_direct, direct, s->denoise, s->light);
+        lx_denoise_layer(f->graph, lx_light_indirect, indirect, s->denoise, s->indirect);
         for (uint32_t i = 0; i < map->count; ++i) s->light[i] = lx_rgb_add(s->light[i], s->indirect[i]);
     } else {
         for (uint32_t i = 0; i < map->count; ++i) s->light[i] = lx_rgb_add(direct[i].mean, indirect[i].mean);

@@ -93,6 +93,22 @@ typedef struct gather_job {
     lx_gather_settings settings;
 } gather_job;
 
+// ---- progress -----------------------------------------------------------------------------------------------------------------
+
+// Runs of the pool that follow one another are one stage to who watches: this one is the part from `from` on, `share` of the whole.
+typedef struct stage_part {
+    const lx_progress_sink *sink;
+    double from, share, start;
+} stage_part;
+
+static bool report_part(void *user, const lx_progress *progress)
+{
+    const stage_part *part = user;
+    if (!part->sink || !part->sink->func) return true;
+    const lx_progress whole = {progress->stage, part->from + part->share * progress->fraction, lx_seconds() - part->start};
+    return part->sink->func(part->sink->user, &whole);
+}
+
 // ---- tiles -----------------------------------------------------------------------------------------------------------------------
 
 static uint32_t max_cells(const gather_job *g)
@@ -194,7 +210,8 @@ static lx_result light_tile(void *user, size_t task, uint32_t worker, lx_error *
     lx_direct_tile direct = {.count = s->count, .place = s->place, .chart = s->chart, .stream = s->stream, .sites = s->sites};
     lx_direct_find_bounds(&direct, &bounds);
     direct.bounds = &bounds;
-    const lx_direct_settings settings = {.tracer = g->bake->tracer, .samples = (desc->samples + lx_direct_sites - 1) / lx_direct_sites * lx_direct_sites};
+    const lx_direct_settings settings = {.tracer = g->bake->tracer, .samples = (desc->samples + lx_direct_sites - 1) / lx_direct_sites * lx_direct_sites,
+                                         .noise = desc->noise};
     const bool bounces = g->settings.bounces > 0;
     for (uint32_t source = 0; source < g->bake->source_count; ++source) {
         const lx_source_use *use = &g->uses[source];
@@ -333,9 +350,14 @@ static lx_result run_passes(gather_job *g, uint32_t wanted, lx_error *error)
     double *last = lx_calloc_array(g->layer_count, sizeof *last);
     if (!last) return lx_fail_memory(error, "irradiance cache");
     memset(g->converged, 0, g->layer_count);
+    stage_part part = {.sink = job->progress, .start = lx_seconds()};
+    const lx_progress_sink sink = {report_part, &part};
     const uint32_t limit = wanted < most_passes ? wanted : most_passes;
     for (uint32_t pass = 0; pass < limit; ++pass) {
-        LX_TRY(lx_pool_run_weighted(pool, job->map.tile_count, job->tile_weights, pass_tile, g, "cache", job->progress, error));
+        const double expected = wanted == LX_BOUNCES_INF ? pass + 4.0 : limit; // nobody knows how many it will take
+        part.from = pass / expected;
+        part.share = 1 / (expected + (wanted == LX_BOUNCES_INF)) * (1 - part.from);
+        LX_TRY(lx_pool_run_weighted(pool, job->map.tile_count, job->tile_weights, pass_tile, g, "cache", &sink, error));
         uint16_t *swap = g->rows[0];
         g->rows[0] = g->rows[1];
         g->rows[1] = swap;
@@ -356,7 +378,9 @@ static lx_result run_passes(gather_job *g, uint32_t wanted, lx_error *error)
         }
         if (all) break;
     }
-    LX_TRY(lx_pool_run(pool, job->map.tile_count, sum_rows, g, "cache", job->progress, error));
+    part.from = 1;
+    part.share = 0;
+    LX_TRY(lx_pool_run(pool, job->map.tile_count, sum_rows, g, "cache", &sink, error));
 cleanup:
     lx_free(last);
     return result;
@@ -497,18 +521,22 @@ static lx_result run_rounds(gather_job *g, double deadline, lx_error *error)
     lx_bake_job *job = g->job;
     lx_pool *pool = g->bake->scene->context->pool;
     const lx_bake_desc *desc = &g->bake->desc;
+    stage_part part = {.sink = job->progress, .start = lx_seconds()};
+    const lx_progress_sink sink = {report_part, &part};
     for (uint32_t done = 0; done < desc->samples;) {
         const uint32_t step = done == 0 ? first_round : done < largest_round ? done : largest_round; // cumulative counts are powers of two, for which Sobol points are best spread
         g->round_first = done;
         g->round_count = step < desc->samples - done ? step : desc->samples - done;
         const double round_start = lx_seconds();
-        LX_TRY(lx_pool_run_weighted(pool, job->map.tile_count, job->tile_weights, gather_tile, g, "gather", job->progress, error));
+        part.from = (double)done / desc->samples;
+        part.share = (double)g->round_count / desc->samples;
+        LX_TRY(lx_pool_run_weighted(pool, job->map.tile_count, job->tile_weights, gather_tile, g, "gather", &sink, error));
         done += g->round_count;
         if (g->round_first == 0) {
             find_layer_means(g);
             continue;
         }
-        if (desc->noise > 0) LX_TRY(lx_pool_run(pool, job->map.tile_count, judge_tile, g, "gather", job->progress, error));
+        if (desc->noise > 0) LX_TRY(lx_pool_run(pool, job->map.tile_count, judge_tile, g, "gather", NULL, error));
         const double now = lx_seconds(), next = (now - round_start) * (double)done / (double)g->round_count;
         if (desc->time_s > 0 && now + next > deadline) break;
         bool all = true;
@@ -715,7 +743,7 @@ static lx_result bake_group(lx_bake_job *job, uint32_t first, uint32_t count, lx
     LX_TRY(lx_pool_run_weighted(pool, job->map.tile_count, job->tile_weights, light_tile, &g, "direct", job->progress, error));
     job->stages.direct += lx_lap(&stage_start);
     if (bounces > 0) {
-        LX_TRY(lx_pool_run(pool, job->map.tile_count, sort_extras, &g, "cache", job->progress, error));
+        LX_TRY(lx_pool_run(pool, job->map.tile_count, sort_extras, &g, "cache", NULL, error));
         LX_TRY(run_passes(&g, bounces == LX_BOUNCES_INF ? bounces : bounces - 1, error));
     }
     job->stages.cache += lx_lap(&stage_start);

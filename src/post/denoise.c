@@ -11,8 +11,8 @@ enum {
     candidate_count = level_count + 1, // the input, then what each level made of it
 };
 
-// Differences of so many standard deviations halve a weight.
-static const float tolerance = 3.0f;
+// Differences of so many standard deviations beyond the noise lower a weight to a quarter.
+static const float tolerances[] = {[lx_light_direct] = 1.5f, [lx_light_indirect] = 3.0f};
 // Below the first relative standard error a luxel counts as clean and stays, above the second nothing holds the filter back.
 static const float clean_error = 0.003f, noisy_error = 0.008f;
 // Variances come from samples that are spread better than chance within each half; what they say of the whole is on the high side. So much
@@ -36,6 +36,7 @@ typedef struct pilot {
 
 typedef struct work {
     const lx_denoise_graph *graph;
+    float tolerance;
     lx_estimate *levels[candidate_count]; // [luxel] the input with smooth variances, then one level's output each
     errors *errors, *other_errors;        // [luxel]
     pilot *pilots;                        // [luxel]
@@ -58,9 +59,9 @@ size_t lx_denoise_scratch_bytes(const lx_denoise_graph *graph)
     return (size_t)graph->luxel_count * (candidate_count * sizeof(lx_estimate) + 2 * sizeof(errors) + sizeof(pilot));
 }
 
-static work lay_out(const lx_denoise_graph *graph, void *scratch)
+static work lay_out(const lx_denoise_graph *graph, lx_light_part part, void *scratch)
 {
-    work w = {.graph = graph};
+    work w = {.graph = graph, .tolerance = tolerances[part]};
     lx_estimate *next = scratch;
     for (int k = 0; k < candidate_count; ++k, next += graph->luxel_count) w.levels[k] = next;
     w.errors = (errors *)(void *)next;
@@ -132,7 +133,7 @@ static void make_pilots(const work *w)
 
 // How far two values may be taken for one: 1 where their variances explain the difference, towards 0 beyond. [Rousselle2012], for a patch of
 // one: what noise alone explains counts as no difference. Instead of exp(-x): 1 / (1 + x)².
-static float likeness(pilot a, pilot b)
+static float likeness(pilot a, pilot b, float tolerance)
 {
     const float difference = a.value - b.value, noise = a.variance + b.variance;
     const float excess = lx_max(0, difference * difference - noise), tolerated = tolerance * tolerance * noise;
@@ -155,7 +156,7 @@ static void filter_level(const work *w, int level)
             const uint32_t other_luxel = link[d] >> lx_denoise_weight_bits;
             const lx_estimate other = in[other_luxel];
             const pilot others = level == 0 ? w->pilots[other_luxel] : (pilot){mean_of(other.mean), other.variance};
-            const float weight = kernel[d] * (float)(link[d] & lx_denoise_most_weight) * likeness(own, others);
+            const float weight = kernel[d] * (float)(link[d] & lx_denoise_most_weight) * likeness(own, others, w->tolerance);
             sum = lx_rgb_add(sum, lx_rgb_scale(other.mean, weight));
             variance += weight * weight * other.variance;
             total += weight;
@@ -220,9 +221,9 @@ static lx_rgb mix(const work *w, uint32_t luxel, lx_rgb input)
     return lx_rgb_add(lx_rgb_scale(input, 1 - noisy), lx_rgb_scale(sum, noisy / total));
 }
 
-void lx_denoise_layer(const lx_denoise_graph *graph, const lx_estimate *in, void *scratch, lx_rgb *out)
+void lx_denoise_layer(const lx_denoise_graph *graph, lx_light_part part, const lx_estimate *in, void *scratch, lx_rgb *out)
 {
-    work w = lay_out(graph, scratch);
+    work w = lay_out(graph, part, scratch);
     bool is_exact = true;
     for (uint32_t i = 0; i < graph->luxel_count && is_exact; ++i) is_exact = !(in[i].variance > 0);
     if (is_exact) {

@@ -13,8 +13,8 @@
 /// Use:
 ///     lx_denoise_graph_create(map, can_step, user, pool, &graph, error);            // once, for all layers
 ///     void *scratch = lx_malloc_array(1, lx_denoise_scratch_bytes(graph));          // per worker
-///     lx_denoise_layer(graph, direct, scratch, direct_out);                         // any layer from any thread
-///     lx_denoise_layer(graph, indirect, scratch, indirect_out);
+///     lx_denoise_layer(graph, lx_light_direct, direct, scratch, direct_out);                         // any layer from any thread
+///     lx_denoise_layer(graph, lx_light_indirect, indirect, scratch, indirect_out);
 #ifndef LX_POST_DENOISE_H
 #define LX_POST_DENOISE_H
 
@@ -43,9 +43,12 @@ size_t lx_denoise_graph_bytes(uint32_t luxel_count);
 size_t lx_denoise_graph_build_bytes(uint32_t luxel_count);
 size_t lx_denoise_scratch_bytes(const lx_denoise_graph *graph);
 
+/// What light is denoised. Direct light has shadow edges, whose differences count for more; indirect light is smooth and its noise has outliers.
+typedef enum lx_light_part { lx_light_direct, lx_light_indirect } lx_light_part;
+
 /// Denoises one layer: `in` [luxel] → `out` [luxel], means alone. `scratch`: lx_denoise_scratch_bytes, 16-byte aligned, content irrelevant before
 /// and after. Variances are those of the mean of the channels, 0 where the light is exact: it stays bit by bit where all within reach are.
 /// Luxels that are not valid keep their value and give none. No value is invented: every channel of `out` lies between those of `in`.
-void lx_denoise_layer(const lx_denoise_graph *graph, const lx_estimate *in, void *scratch, lx_rgb *out);
+void lx_denoise_layer(const lx_denoise_graph *graph, lx_light_part part, const lx_estimate *in, void *scratch, lx_rgb *out);
 
 #endif

@@ -8,6 +8,9 @@
 // Luxels whose 16 rays differ lie in a penumbra or on an edge and send the rays of all samples. So do those whose looks, with their neighbours', are too few
 // to tell, in narrow charts and where a few samples carry most of the light, and those beside a penumbra.
 //
+// Where `noise` is given, the number of samples grows fourfold at a time, and a luxel that is sure enough of its light needs no more; where the source gives
+// next to nothing, little is enough.
+//
 // A luxel's samples are cut into four runs. Each is a well-spread set in itself, so what they disagree by tells the variance of their mean.
 #include "trace/direct.h"
 
@@ -29,6 +32,10 @@ enum {
 
 // Unshadowed light whose mean varies by more, of itself, is looked at in all samples instead of the first 16.
 static const float fine_deviation = 0.004f;
+
+// Shares of the noise that is wanted which light straight from one source may have, where shadows fall and where none do.
+static const float shadowed_share = 0.5f, unshadowed_share = 0.25f;
+static const float darkest = 0.01f; // of the mean light of the source: what is darker need not be surer
 
 // Looks of equal weight that must agree in a luxel and its neighbours: what they miss is a share of the source below its inverse, mostly.
 static const float enough_looks = 20, enough_own_looks = 6; // the latter of the 16 that a luxel with doubts takes
@@ -73,7 +80,9 @@ typedef struct job {
     const lx_tracer *tracer;
     const lx_direct_tile *tile;
     uint32_t source, key, cells, weight;
-    uint32_t samples; // of a luxel
+    uint32_t samples; // of a luxel, at most
+    uint32_t first_samples; // of which so many come first, then four times as many, and so on
+    float noise, least; // standard error wanted, of the light or of `least`
 } job;
 
 lx_direct_batch *lx_direct_batch_create(const lx_tracer *tracer)
@@ -384,7 +393,8 @@ static void sum_evenly_lit(const job *j, uint32_t luxel, lx_rgb *mean, float *va
         add_unshadowed(j, luxel, 0, samples, samples);
         const lx_rgb sum = j->b->sums[0];
         const float all = (sum.r + sum.g + sum.b) * (1.0f / 3) / (float)samples;
-        if (variance_of_mean(j->b->run_sums[0], runs / (float)samples) > fine_deviation * fine_deviation * all * all) {
+        const float fine = lx_max(fine_deviation, unshadowed_share * j->noise), bright = lx_max(all, j->least);
+        if (variance_of_mean(j->b->run_sums[0], runs / (float)samples) > fine * fine * bright * bright) {
             clear_sums(j, 1);
             samples = j->samples;
             add_unshadowed(j, luxel, 0, samples, samples);
@@ -402,30 +412,62 @@ static void finish_sums(const job *j, size_t count)
         add_to(j->b, j->b->owner[k], j->b->run[k], lx_rgb_mul(j->b->light[k], j->b->transmittance[k]));
 }
 
-// All rays of the listed luxels: those looked at already, and the others.
-static void sum_shadowed(const job *j, const uint16_t *list, uint32_t list_count, lx_rgb *mean, float *variance)
+// Rays of the listed slots' samples up to number `end`; the first `done` were taken before, or looked at.
+static void sum_samples(const job *j, const uint16_t *list, const uint8_t *slots, uint32_t slot_count, uint32_t done, uint32_t end)
 {
     lx_direct_batch *b = j->b;
     size_t count = 0;
-    clear_sums(j, list_count);
-    for (uint32_t slot = 0; slot < list_count; ++slot) {
-        const uint32_t luxel = list[slot];
-        for (uint32_t i = 0; i < b->luxels[luxel].looked; ++i) {
-            const look *l = &b->looks[luxel][i];
-            if (l->arrives) add_to(b, slot * j->cells + l->cell, i * runs / j->samples, lx_rgb_mul(l->light, l->transmittance));
+    for (uint32_t s = 0; s < slot_count; ++s) {
+        const uint32_t slot = slots[s], luxel = list[slot];
+        uint32_t first = done;
+        for (; first < b->luxels[luxel].looked; ++first) {
+            const look *l = &b->looks[luxel][first];
+            if (l->arrives) add_to(b, slot * j->cells + l->cell, first * runs / end, lx_rgb_mul(l->light, l->transmittance));
         }
-        for (uint32_t i = b->luxels[luxel].looked; i < j->samples; ++i) {
+        for (uint32_t i = first; i < end; ++i) {
             uint32_t cell;
             if (!take_sample(j, luxel, i, &b->rays[count], &b->light[count], &cell)) continue;
             b->owner[count] = slot * j->cells + cell;
-            b->run[count] = (uint8_t)(i * runs / j->samples);
+            b->run[count] = (uint8_t)(i * runs / end);
             if (++count < ray_batch) continue;
             finish_sums(j, count);
             count = 0;
         }
     }
     finish_sums(j, count);
-    for (uint32_t slot = 0; slot < list_count; ++slot) store(j, list[slot], slot, j->samples, (lx_rgb){1, 1, 1}, mean, variance);
+}
+
+static bool is_sure(const job *j, uint32_t slot, uint32_t samples)
+{
+    const lx_rgb sum = j->b->sums[slot];
+    const float mean = (sum.r + sum.g + sum.b) * (1.0f / 3) / (float)samples, allowed = shadowed_share * j->noise * lx_max(mean, j->least);
+    return variance_of_mean(j->b->run_sums[slot], runs / (float)samples) <= allowed * allowed;
+}
+
+// The listed luxels by rays of their samples: all of them, or as many as make them sure enough.
+static void sum_shadowed(const job *j, const uint16_t *list, uint32_t list_count, lx_rgb *mean, float *variance)
+{
+    lx_direct_batch *b = j->b;
+    uint8_t slots[chunk_luxels];
+    uint32_t count = list_count, done = 0;
+    clear_sums(j, list_count);
+    for (uint32_t s = 0; s < list_count; ++s) slots[s] = (uint8_t)s;
+    for (uint32_t end = j->first_samples; count > 0; done = end, end *= runs) {
+        sum_samples(j, list, slots, count, done, end);
+        uint32_t left = 0;
+        for (uint32_t s = 0; s < count; ++s) {
+            const uint32_t slot = slots[s];
+            if (end == j->samples || is_sure(j, slot, end)) {
+                store(j, list[slot], slot, end, (lx_rgb){1, 1, 1}, mean, variance);
+                continue;
+            }
+            float *sums = b->run_sums[slot]; // what were four runs is the first of the next four
+            sums[0] += sums[1] + sums[2] + sums[3];
+            sums[1] = sums[2] = sums[3] = 0;
+            slots[left++] = (uint8_t)slot;
+        }
+        count = left;
+    }
 }
 
 bool lx_direct_light(lx_direct_batch *b, const lx_direct_settings *settings, const lx_direct_tile *tile, uint32_t source, lx_rgb *mean,
@@ -437,6 +479,11 @@ bool lx_direct_light(lx_direct_batch *b, const lx_direct_settings *settings, con
     job j = {.b = b, .tracer = tracer, .tile = tile, .source = source, .key = lx_hash_combine(tracer->source_keys[source], 0),
              .cells = lx_tracer_cell_count(tracer, source), .weight = lx_direct_sample_weight(tracer, source)};
     j.samples = is_sharp(tracer, source) ? (uint32_t)lx_direct_sites : settings->samples * j.weight;
+    j.first_samples = j.samples;
+    j.noise = settings->noise;
+    j.least = darkest * 20 * tracer->source_scales[source]; // which are a twentieth of the mean
+    // A monitor's cells must each be sure; and without a bound nothing ends early.
+    while (j.cells == 1 && j.noise > 0 && j.first_samples % runs == 0 && j.first_samples / runs >= lx_direct_sites) j.first_samples /= runs;
     memset(b->luxels, 0, tile->count * sizeof *b->luxels);
     if (!settings->all_rays) {
         place_on_grid(b, tile);

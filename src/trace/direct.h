@@ -33,6 +33,7 @@ void lx_direct_find_bounds(const lx_direct_tile *tile, lx_direct_bounds *out);
 typedef struct lx_direct_settings {
     const lx_tracer *tracer;
     uint32_t samples;           ///< At most so many shadow rays a luxel and source (times lx_direct_sample_weight), a multiple of lx_direct_sites.
+    float noise;                ///< Luxels that are surer than a share of it (standard error over light) take fewer. 0: all samples.
     bool all_rays;              ///< Every sample gets its ray: the referee of what is spared otherwise.
 } lx_direct_settings;
 

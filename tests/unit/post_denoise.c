@@ -41,17 +41,19 @@ static void add_noise(float relative, uint32_t seed)
     }
 }
 
-static void denoise_with(lx_step_test can_step)
+static void denoise_part(lx_step_test can_step, lx_light_part part)
 {
     lx_denoise_graph *graph;
     lx_error error;
     if (lx_denoise_graph_create(&map, can_step, NULL, pool, &graph, &error) != LX_OK) fail_msg("%s", error.message);
     void *scratch = malloc(lx_denoise_scratch_bytes(graph));
     memset(scratch, 0x7f, lx_denoise_scratch_bytes(graph));
-    lx_denoise_layer(graph, noisy, scratch, clean);
+    lx_denoise_layer(graph, part, noisy, scratch, clean);
     free(scratch);
     lx_denoise_graph_destroy(graph);
 }
+
+static void denoise_with(lx_step_test can_step) { denoise_part(can_step, lx_light_indirect); }
 
 // Error after over error before, root mean square, over luxels whose texel's column lies in low … high - 1.
 static double error_ratio(uint32_t low, uint32_t high)
@@ -90,7 +92,7 @@ static void denoise_shadow_edge_stays(void **state)
     one_floor();
     for (uint32_t i = 0; i < map.count; ++i) truth[i] = lx_rgb_grey(map.texel[i] % page_edge < 30 ? 10 : 0.5f);
     add_noise(0.05f, 11);
-    denoise_with(NULL);
+    denoise_part(NULL, lx_light_direct);
     const double all = error_ratio(0, page_edge), edge = error_ratio(28, 32);
     if (!(all < 0.5) || !(edge < 0.9)) fail_msg("%.3f of the noise is left, %.3f at the edge", all, edge);
 }
@@ -101,7 +103,7 @@ static void denoise_bright_spot_does_not_run(void **state)
     one_floor();
     for (uint32_t i = 0; i < map.count; ++i) truth[i] = lx_rgb_grey(map.texel[i] == 30 * page_edge + 30 ? 1000 : 1);
     add_noise(0.03f, 13);
-    denoise_with(NULL);
+    denoise_part(NULL, lx_light_direct);
     for (uint32_t i = 0; i < map.count; ++i)
         if (map.texel[i] != 30 * page_edge + 30 && !(clean[i].g < 1.2f)) fail_msg("texel %u became %g", map.texel[i], (double)clean[i].g);
     assert_true(fabsf(clean[luxel_index[30 * page_edge + 30]].g - 1000) < 100); // three standard errors
