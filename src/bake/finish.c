@@ -104,6 +104,15 @@ void lx_finish_close(lx_finish *f)
     lx_free(f);
 }
 
+uint64_t lx_finish_worker_bytes(const lx_finish *f)
+{
+    const lx_luxel_map *map = &f->job->map.view;
+    uint64_t bytes = f->entry_count * sizeof(lx_rgb) + lx_stitch_scratch_bytes(f->stitch);
+    if (f->graph) bytes += map->count * sizeof(lx_rgb) + lx_denoise_scratch_bytes(f->graph);
+    if (f->oidn) bytes += (uint64_t)map->page_size * map->page_size * 2 * sizeof(lx_rgb); // a page on its way in and out
+    return bytes;
+}
+
 static lx_result finish_layer(void *user, size_t task, uint32_t worker, lx_error *error)
 {
     const layers_job *j = user;

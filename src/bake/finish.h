@@ -13,6 +13,8 @@ typedef struct lx_finish lx_finish;
 /// What all layers share: who neighbours whom, the seams, the library of `--denoise oidn`. `job` must outlive it.
 lx_result lx_finish_open(const lx_bake_job *job, lx_finish **out_finish, lx_error *error);
 void lx_finish_close(lx_finish *finish);
+/// Memory that a worker takes for a layer at work. What the library of `--denoise oidn` takes on top is not known.
+uint64_t lx_finish_worker_bytes(const lx_finish *finish);
 
 /// Estimates of `layer_count` layers from number `first_layer` on, [layer][luxel], direct and indirect light apart: what is noisy in one may be sharp in
 /// the other. Luxels that are not valid are black; dilation fills them.

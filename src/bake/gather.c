@@ -757,6 +757,7 @@ static lx_result bake_group(lx_bake_job *job, uint32_t first, uint32_t count, lx
     job->stages.gather += lx_lap(&stage_start);
     add_to_sums(&g);
     release_cache(&g, workers);
+    lx_trim_memory();
     LX_TRY(lx_finish_layers(finish, g.direct, g.indirect, first, count, error));
     job->stages.denoise += lx_lap(&stage_start);
 cleanup:
@@ -778,14 +779,15 @@ lx_result lx_bake_by_gathering(lx_bake_job *job, lx_error *error)
         goto cleanup;
     }
     lx_memory_plan plan;
-    LX_TRY(lx_memory_plan_make(job, &plan, error));
-    job->predicted_bytes = plan.peak_bytes;
     LX_TRY(lx_finish_open(job, &finish, error));
+    LX_TRY(lx_memory_plan_make(job, finish, &plan, error));
+    job->predicted_bytes = plan.peak_bytes;
     for (uint32_t first = 0; first < bake->layer_count; ++job->group_count) {
         const uint32_t count = lx_memory_group(bake, &plan, first);
         const double share = (double)(first + count) / bake->layer_count; // of the time that all groups have
         LX_TRY(bake_group(job, first, count, uses, sums, finish, start + share * bake->desc.time_s, error));
         first += count;
+        lx_trim_memory(); // what one group leaves behind in holes is not there for the next
     }
     job->noise = estimate_noise(job, sums);
 cleanup:

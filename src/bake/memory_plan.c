@@ -5,7 +5,6 @@
 #include "base/clock.h"
 #include "base/error.h"
 #include "base/memory.h"
-#include "post/denoise.h"
 
 // What gathering keeps, in bytes.
 static const struct {
@@ -16,8 +15,6 @@ static const struct {
     uint32_t sum;             // estimate of the sum of all layers
     uint32_t estimate;        // and layer: direct and indirect light
     uint32_t row;             // and layer, layers padded: direct light, and radiosity of two passes, three half floats each
-    uint32_t denoised;        // and worker: a layer's direct and indirect light,
-    uint32_t denoise_scratch; // likewise: lx_denoise_scratch_bytes
     // Per texel of the pages:
     uint32_t place;
     // Per tile and layer:
@@ -33,8 +30,6 @@ static const struct {
     .sum = 5 * sizeof(float),
     .estimate = 2 * sizeof(lx_estimate),
     .row = 3 * 3 * sizeof(uint16_t),
-    .denoised = 2 * sizeof(lx_rgb),
-    .denoise_scratch = 5 * sizeof(lx_estimate) + 2 * 5 * sizeof(float) + 2 * sizeof(float),
     .place = 2 * sizeof(uint32_t),
     .tile = 2 * sizeof(double) + sizeof(uint32_t) + 1,
     .batches = 4 << 20,
@@ -66,19 +61,8 @@ static uint32_t largest_cell_count(const lx_bake *bake)
     return largest;
 }
 
-// Layers are denoised one by one, each by one worker.
-static uint64_t denoise_bytes(const lx_bake_job *job, uint32_t workers, uint32_t layers)
-{
-    const uint64_t luxels = job->map.view.count;
-    const uint32_t busy = layers < workers ? layers : workers;
-    if (job->bake->desc.denoise == LX_DENOISE_NONE) return luxels * sizeof(lx_rgb) * busy;
-    const uint64_t graph = lx_denoise_graph_bytes(job->map.view.count), building = lx_denoise_graph_build_bytes(job->map.view.count);
-    const uint64_t working = graph + luxels * busy * (cost.denoised + cost.denoise_scratch);
-    return working > building ? working : building;
-}
-
 // What baking a group of `layers` adds to what is there.
-static uint64_t group_bytes(const lx_bake_job *job, uint32_t layers)
+static uint64_t group_bytes(const lx_bake_job *job, const lx_finish *finish, uint32_t layers)
 {
     const lx_bake *bake = job->bake;
     const uint64_t luxels = job->map.view.count, padded = lx_row_layers(layers);
@@ -87,7 +71,7 @@ static uint64_t group_bytes(const lx_bake_job *job, uint32_t layers)
     const uint64_t estimates = luxels * (cost.sum + (uint64_t)cost.estimate * layers) + (uint64_t)job->map.tile_count * cost.tile * layers;
     uint64_t cache = lookup_bytes(bake) + workers * (cost.batches + cost.worker_row * padded + (uint64_t)cost.worker_cell * largest_cell_count(bake));
     if (bounces) cache += luxels * (cost.albedo + cost.pass_ray * most_pass_rays + cost.extra + cost.row * padded);
-    const uint64_t finishing = denoise_bytes(job, workers, layers); // the cache is gone by then
+    const uint64_t finishing = lx_finish_worker_bytes(finish) * (layers < workers ? layers : workers); // the cache is gone by then
     return estimates + (cache > finishing ? cache : finishing);
 }
 
@@ -104,30 +88,30 @@ static uint64_t save_bytes(const lx_bake *bake, uint64_t resident, uint64_t fini
     return resident + finished + images + pack + again + pages;
 }
 
-lx_result lx_memory_plan_make(const lx_bake_job *job, lx_memory_plan *out, lx_error *error)
+lx_result lx_memory_plan_make(const lx_bake_job *job, const lx_finish *finish, lx_memory_plan *out, lx_error *error)
 {
     const lx_bake *bake = job->bake;
-    const uint64_t limit = bake->desc.memory_bytes;
+    const uint64_t limit = bake->desc.memory_bytes, kept = limit - limit / 16; // what the allocator loses between blocks is not counted
     lx_trim_memory();
     const uint64_t resident = lx_resident_memory(), before = lx_peak_memory();
-    const uint64_t finished = limit ? 0 : (uint64_t)job->map.view.count * bake->layer_count * sizeof(lx_rgb);
+    const uint64_t finished = limit ? 0 : (uint64_t)lx_finished_count(bake->finished) * bake->layer_count * sizeof(lx_rgb);
     lx_memory_plan plan = {.resident_bytes = resident, .save_bytes = save_bytes(bake, resident, finished), .group_layers = bake->layer_count};
     uint32_t least = bake->layer_count > 0 ? 1 : 0;
     for (uint32_t i = 0; i < bake->layer_count; ++i) // cells follow one another
         if (bake->layers[i].monitor && bake->layers[i].cell + 1 > least) least = bake->layers[i].cell + 1;
-    while (limit && plan.group_layers > least && resident + group_bytes(job, plan.group_layers) > limit) --plan.group_layers;
-    plan.group_bytes = group_bytes(job, plan.group_layers);
+    while (limit && plan.group_layers > least && resident + group_bytes(job, finish, plan.group_layers) > kept) --plan.group_layers;
+    plan.group_bytes = group_bytes(job, finish, plan.group_layers);
     const uint64_t baking = resident + plan.group_bytes + finished;
     plan.peak_bytes = baking > plan.save_bytes ? baking : plan.save_bytes;
     if (before > plan.peak_bytes) plan.peak_bytes = before;
     *out = plan;
-    if (!limit || plan.peak_bytes <= limit) return LX_OK;
+    if (!limit || (plan.peak_bytes <= limit && baking <= kept)) return LX_OK;
     const double mib = 1.0 / (1 << 20);
-    if (plan.peak_bytes == baking)
+    if (plan.peak_bytes == baking || plan.peak_bytes <= limit)
         return lx_fail(error, LX_ERROR_LIMIT, "%.0f MiB of memory are not enough: %u texels and %u layer%s at once need %.0f MiB; fewer or smaller pages need less",
-                       (double)limit * mib, job->map.view.count, least, least == 1 ? "" : "s, the cells of a monitor,", (double)plan.peak_bytes * mib);
+                       (double)limit * mib, job->map.view.count, least, least == 1 ? "" : "s, the cells of a monitor,", ceil((double)baking * 1.09 * mib)); // with room for the next run to differ a little
     return lx_fail(error, LX_ERROR_LIMIT, "%.0f MiB of memory are not enough: %s needs %.0f MiB", (double)limit * mib,
-                   plan.peak_bytes == before ? "reading the scene" : "saving", (double)plan.peak_bytes * mib);
+                   plan.peak_bytes == before ? "preparing" : "saving", (double)plan.peak_bytes * mib);
 }
 
 uint32_t lx_memory_group(const lx_bake *bake, const lx_memory_plan *plan, uint32_t first)
