@@ -7,7 +7,7 @@ import subprocess
 import sys
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..")
-PROGRAM = os.path.join(ROOT, "build/release/bench/bench_bakes")
+PROGRAM = os.environ.get("LUXEL_BENCH_BAKES") or os.path.join(ROOT, "build/release/bench/bench_bakes")
 sys.dont_write_bytecode = True
 sys.path[:0] = [os.path.join(ROOT, folder) for folder in ("bench", "scenes", "tests/cli", "tests/statistical")]
 

@@ -9,9 +9,11 @@ import oracle
 from gltf import Gltf, box, box_between, look, quad, quat, quat_rotate, v_add, v_dot, v_len, v_mul, v_norm, v_sub
 from harness import expect, luxel, read
 from lamps import COLOR, DOWN, lamp, node
-from measure import below, case, compare, compare_mean, grey
+import measure
+from measure import below, both, compare, compare_mean, grey, limit
 from skies import hdr
 
+HALF = 2e-3   # what rounding of the irradiance cache to half floats may do to sums of layers
 LOW, HIGH = 0.1, 0.9  # lightmap coordinates of our quads: the rest is padding
 
 
@@ -47,7 +49,7 @@ class Baked:
 def bake(scene, out, page, samples, bounces, *options):
     scene.save("scene.glb")
     luxel("bake", "scene.glb", "-o", out, "--page-size", str(page), "--samples", str(samples), "--bounces", str(bounces), "--format",
-          "exr", "--no-preview", "--quiet", *options, timeout=600)
+          "exr", "--no-preview", "--quiet", *measure.integrator, *options, timeout=600)
     return Baked(out)
 
 
@@ -92,7 +94,7 @@ def floor_scene(scene, size, turn=UP, scale=None, place=(0, 0, 0)):
     node(scene, "floor", mesh=scene.add_mesh("floor", (mapped_quad(*size), white)), rotation=turn, scale=scale, translation=place)
 
 
-@case
+@both
 def texels_of_a_floor_hold_the_mean_of_a_point_light():
     place, size = (0.3, 0.5, -0.7), (3.0, 2.0)
     scene = lamp("point", 20, place)
@@ -108,7 +110,7 @@ def texels_of_a_floor_hold_the_mean_of_a_point_light():
     expect([round(c, 4) for c in baked.factor("lamp")] == [20 * c for c in COLOR], "factor %s" % baked.factor("lamp"))
 
 
-@case
+@both
 def texels_under_a_rectangle_light_meet_lamberts_formula():
     scene, size = Gltf(), (3.0, 2.0)
     turn = look((0, 0, 0), (0.4, -1, 0.3))
@@ -127,7 +129,7 @@ def texels_under_a_rectangle_light_meet_lamberts_formula():
     compare_mean("mean of the floor", math.fsum(expected) / len(expected), [g[0] for g in got], 2e-3, 1024)
 
 
-@case
+@both
 def texels_of_mirrored_and_stretched_floors_lie_where_they_should():
     place, size = (0.3, 0.9, -0.7), (1.0, 1.0)
 
@@ -142,7 +144,7 @@ def texels_of_mirrored_and_stretched_floors_lie_where_they_should():
         compare("scale %g %g %g" % scale, grey(expected), got, 0.015, 64)
 
 
-@case
+@both
 def texels_at_the_foot_of_a_wall_see_half_the_sky():
     scene, size = Gltf(), (4.0, 2.0)
     floor_scene(scene, size)
@@ -154,7 +156,7 @@ def texels_at_the_foot_of_a_wall_see_half_the_sky():
     compare_mean("mean of the floor", math.pi / 2, [g[0] for g in got], 3e-3, 1024)
 
 
-@case
+@both
 def texels_of_a_furnace_all_reach_its_geometric_sum():
     scene = Gltf()
     wall = scene.add_material("wall", base_color=(0.5, 0.5, 0.5), emissive=(1, 1, 1), strength=5)
@@ -166,7 +168,7 @@ def texels_of_a_furnace_all_reach_its_geometric_sum():
     compare_mean("mean of the room", 10 * math.pi, values, 3e-3, 256)
 
 
-@case
+@both
 def texels_of_a_closed_dark_box_stay_dark():
     scene = Gltf()
     white = scene.add_material("white", base_color=(0.8, 0.8, 0.8))
@@ -183,7 +185,7 @@ def texels_of_a_closed_dark_box_stay_dark():
     below("mean, of 100 lux", 1e-5, [math.fsum(values) / len(values) / 100], 256)
 
 
-@case
+@both
 def texels_take_the_interpolated_vertex_normal_and_nothing_from_below_the_surface():
     slant = v_norm((0.5, 0, 0.8660254))  # of the quad, which faces +z before it is turned up
     for towards, name in (((0, 1, 0), "from above"), (v_norm((0.6, 0.8, 0)), "along the vertex normal"), (v_norm((1, -0.1, 0)), "from below")):
@@ -233,7 +235,7 @@ def sides_of_a_house(solids):
     compare("each texel, house of %d solids" % solids, grey(expected), got, 1e-4, 64)
 
 
-@case
+@both
 def texels_under_a_wall_belong_to_the_side_they_come_out_at():
     sides_of_a_house(1)
     sides_of_a_house(5)
@@ -282,28 +284,28 @@ def close(what, baked, first, second, tolerance, samples=16):
     below(what, tolerance, [worst[0]], samples)
 
 
-@case
+@both
 def layers_at_their_authored_colours_sum_to_the_combined_bake():
     options = sky_options()
     layers = bake(mixed_scene(), "layers", 64, 16, 3, *options)
     combined = bake(mixed_scene(), "combined", 64, 16, 3, *options, "--layers", "combined")
     expect(sorted(layers.layers) == ["ball", "bulb", "panel", "sky", "spot", "sun", "tube"], "layers %s" % sorted(layers.layers))
     expect(list(combined.layers) == ["combined"], "layers %s" % list(combined.layers))
-    close("sum of 7 layers against combined, relative", combined, combined.layers["combined"], layers.sum(), 1e-5)
+    close("sum of 7 layers against combined, relative", combined, combined.layers["combined"], layers.sum(), limit(1e-5, HALF))
 
 
-@case
+@both
 def direct_and_indirect_bakes_add_up_to_the_whole():
     options = sky_options()
     whole = bake(mixed_scene(), "whole", 64, 16, 3, *options)
     direct = bake(mixed_scene(), "direct", 64, 16, 3, *options, "--direct-only")
     indirect = bake(mixed_scene(), "indirect", 64, 16, 3, *options, "--indirect-only")
     for name in whole.layers:
-        both = [[a + b for a, b in zip(d, i)] for d, i in zip(direct.layers[name], indirect.layers[name])]
-        close("%s: direct + indirect" % name, whole, whole.layers[name], both, 1e-5)
+        both_parts = [[a + b for a, b in zip(d, i)] for d, i in zip(direct.layers[name], indirect.layers[name])]
+        close("%s: direct + indirect" % name, whole, whole.layers[name], both_parts, 1e-5)
 
 
-@case
+@both
 def mixed_light_bakes_only_what_bounces():
     options = sky_options()
     mode = {"luxel_mode": "mixed"}
@@ -315,17 +317,18 @@ def mixed_light_bakes_only_what_bounces():
         close("%s: mixed" % name, plain, same_as.layers[name], mixed.layers[name], 1e-6)
 
 
-@case
+@both
 def realtime_light_is_left_out():
     options = sky_options()
     plain = bake(mixed_scene(), "plain", 64, 16, 3, *options)
     less = bake(mixed_scene({"bulb": {"luxel_mode": "realtime"}, "panel": {"luxel_mode": "realtime"}}), "less", 64, 16, 3, *options)
     expect(sorted(less.layers) == ["ball", "sky", "spot", "sun", "tube"], "layers %s" % sorted(less.layers))
     for name in less.layers:
-        close("%s: others unchanged" % name, plain, plain.layers[name], less.layers[name], 1e-6)
+        # The panel no longer shines, so gather rays that hit it are looked up at once: other random numbers, and 16 samples of noise.
+        close("%s: others unchanged" % name, plain, plain.layers[name], less.layers[name], limit(1e-6, 0.05))
 
 
-@case
+@both
 def group_of_different_colours_keeps_their_proportions():
     options = sky_options()
     single = bake(mixed_scene(), "single", 64, 16, 3, *options)
@@ -336,11 +339,11 @@ def group_of_different_colours_keeps_their_proportions():
     expect(grouped.factor("warm and cold") == [largest] * 3, "factor %s" % grouped.factor("warm and cold"))
     expected = [[sum(single.factor(n)[c] / largest * single.layers[n][c][t] for n in ("bulb", "ball", "spot"))
                  for t in range(64 * 64)] for c in range(3)]
-    close("T = sum of (colour × intensity / K) T_s", grouped, expected, grouped.layers["warm and cold"], 1e-5)
-    close("all layers", single, single.sum(), grouped.sum(), 1e-5)
+    close("T = sum of (colour × intensity / K) T_s", grouped, expected, grouped.layers["warm and cold"], limit(1e-5, HALF))
+    close("all layers", single, single.sum(), grouped.sum(), limit(1e-5, HALF))
 
 
-@case
+@both
 def group_of_one_colour_keeps_it_free():
     def scene(extras):
         out = Gltf()
@@ -355,7 +358,7 @@ def group_of_one_colour_keeps_it_free():
     close("T = sum of (intensity / strongest) T_s", grouped, expected, grouped.layers["both"], 1e-5)
 
 
-@case
+@both
 def one_thread_and_two_threads_write_the_same_bytes():
     options = sky_options()
     first = bake(mixed_scene(), "one", 64, 16, 3, *options, "--threads", "1")
@@ -366,7 +369,7 @@ def one_thread_and_two_threads_write_the_same_bytes():
     below("files that differ", 0.5, [len(different)], 16)
 
 
-@case
+@both
 def layer_does_not_change_when_other_lights_come_and_go():
     options = sky_options()
     plain = bake(mixed_scene(), "plain", 64, 16, 3, *options)

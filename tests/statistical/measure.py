@@ -24,6 +24,33 @@ def case(function):
     return function
 
 
+PATH = ("--integrator", "path")
+GATHER = ("--integrator", "gather", "--noise", "0", "--denoise", "none")
+integrator = PATH  # of the bakes of the case at work
+
+
+def both(function):
+    """Registers a function that bakes twice: with the path integrator, and with the gather integrator as NAME_by_gathering."""
+    def with_integrator(options):
+        def run():
+            global integrator
+            integrator = options
+            try:
+                function()
+            finally:
+                integrator = PATH
+        run.__module__ = function.__module__
+        return run
+    CASES[function.__name__] = function
+    CASES[function.__name__ + "_by_gathering"] = with_integrator(GATHER)
+    return function
+
+
+def limit(path, gather):
+    """A tolerance that depends on the integrator."""
+    return path if integrator == PATH else gather
+
+
 class Row:
     def __init__(self, what, expected, got, error, tolerance, points, samples):
         self.what, self.expected, self.got, self.error = what, expected, got, error

@@ -9,7 +9,7 @@ from bakes import UP, bake
 from gltf import Gltf, box, grid, quad, quat, quat_rotate, v_add, v_dot, v_sub
 from harness import expect
 from lamps import node
-from measure import Row, case, compare, compare_mean, grey
+from measure import Row, both, case, compare, compare_mean, grey
 
 WIDTH, HEIGHT = 1.6, 0.9
 PLACE, TURN = (0.2, 0.9, -0.6), quat((1, 0, 0), 35)  # leans over the floor, its picture towards +z and down
@@ -82,14 +82,14 @@ def compare_cells(what, baked, columns, rows, samples, tolerance, corners_of):
         compare_mean("%s, cell %d, mean of the floor" % (what, cell), math.fsum(expected) / len(expected), [g[0] for g in got], 0.004, samples)
 
 
-@case
+@both
 def cells_of_a_monitor_light_the_floor_from_their_places():
     baked = bake(screen(3, 2), "out", PAGE, 1024, 0)
     expect(sorted(baked.layers) == ["tv/%d" % k for k in range(6)], "layers %s" % sorted(baked.layers))
     compare_cells("3 by 2", baked, 3, 2, 1024, 0.06, lambda cell: cell_corners(3, 2, cell))
 
 
-@case
+@both
 def cells_follow_texture_coordinates_not_corners():
     # u runs from right to left, in a mesh of many triangles whose edges are not the cells'.
     mesh = grid(WIDTH, HEIGHT, 5, 4, fit=True).scale_uv(-1, 1).shift_uv(1, 0)
@@ -104,22 +104,23 @@ def room(columns, rows):
     return scene
 
 
-@case
+@both
 def cells_at_one_colour_add_up_to_the_whole_screen():
     whole = bake(room(0, 0), "whole", 64, 1024, 4)
     expected = whole.sum()
     texels = whole.texels()
-    for columns, rows, rounding, noise in ((1, 1, 1e-6, 1e-6), (4, 3, 1e-4, 5e-3)):  # one cell: the same paths
+    for columns, rows, rounding, noise in ((1, 1, 1e-6, 1e-6), (4, 3, 3e-4, 5e-3)):  # one cell: the same paths; more: noise of 0.2 % a texel
         got = bake(room(columns, rows), "cells %d" % columns, 64, 1024, 4).sum()
+        rounding = measure.limit(rounding, 1e-3)  # gather: other samples at near hits, half floats in the cache
         for c, channel in enumerate("red green blue".split()):
             mean = math.fsum(expected[c][t] for t in texels) / len(texels)
             compare_mean("%d by %d, %s" % (columns, rows, channel), mean, [got[c][t] for t in texels], rounding, 1024)
         error = math.sqrt(math.fsum((got[c][t] - expected[c][t]) ** 2 for c in range(3) for t in texels) /
                           math.fsum(expected[c][t] ** 2 for c in range(3) for t in texels))
-        measure.below("%d by %d, RMSE of texels, relative" % (columns, rows), noise, [error], 1024)
+        measure.below("%d by %d, RMSE of texels, relative" % (columns, rows), measure.limit(noise, 5e-3), [error], 1024)
 
 
-@case
+@both
 def monitors_that_share_their_cells_add_up_in_each():
     places = [(PLACE, TURN), ((0.9, 1.1, 0.5), quat((1, 0, 0), 90))]
     scene = screen(2, 2, layer="tv")
@@ -135,7 +136,7 @@ def monitors_that_share_their_cells_add_up_in_each():
 LETTER = ["####.", "#...#", "####.", "#..#.", "#...#"]  # an R: no mirror image and no turn of it is an R
 
 
-@case
+@both
 def letter_on_a_monitor_lights_the_floor_as_it_reads():
     def picture(scene):
         pixels = bytes(255 if c == "#" else 0 for row in LETTER for c in row for _ in range(3))
