@@ -63,7 +63,8 @@ typedef struct lx_bake lx_bake;
 /// Prepares a bake: layers, texels, ray tracing structures. Scene and atlas must outlive it.
 LX_API lx_result lx_bake_create(const lx_scene *scene, const lx_atlas *atlas, const lx_bake_desc *desc, lx_bake **out_bake,
                                 lx_error *error);
-/// Traces and post-processes. Long: `progress` is called with the stages "luxels", "bake", "post"; false cancels.
+/// Traces and post-processes. Long: `progress` is called with the stages "luxels", "padding", then "bake" (path) or, for each
+/// group of layers, "direct", "cache", "gather", "denoise"; false cancels.
 LX_API lx_result lx_bake_run(lx_bake *bake, const lx_progress_sink *progress, lx_error *error);
 
 typedef enum lx_lightmap_format {

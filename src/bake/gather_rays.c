@@ -150,6 +150,12 @@ static inline lx_vec3 cosine_direction(lx_vec2 u)
     return (lx_vec3){radius * cosine, radius * sine, sqrtf(1 - u.x)};
 }
 
+// Random bits of the tap at a hit: the same whichever loop looks it up.
+static uint32_t tap_bits(uint32_t stream, uint32_t vertex, uint32_t sample)
+{
+    return lx_hash32((vertex == 0 ? stream : dimension_key(stream, vertex, 0)) ^ (sample * 0x9e3779b9u));
+}
+
 // ---- the first loop ----------------------------------------------------------------------------------------------------------------
 
 static void send(lx_gather_batch *b, const lx_ray *ray, const lx_hit *hit, const flight *f)
@@ -253,8 +259,7 @@ static void first_hits(lx_gather_batch *b, const lx_gather_settings *settings, c
         const bool may_look_up = surface->plain && surface->triangles && !hit->back && hit->t >= settings->near_texels * surface->texel_m &&
                                  surface->triangles[hit->triangle].chart != LX_NO_CHART;
         if (may_look_up) {
-            const uint32_t random = lx_hash32(start->stream ^ (start->sample * 0x9e3779b9u));
-            const lx_taps taps = lx_lookup_taps(settings->lookup, hit, random);
+            const lx_taps taps = lx_lookup_taps(settings->lookup, hit, tap_bits(start->stream, 0, start->sample));
             __builtin_prefetch(&settings->lookup->places[taps.tap]);
             b->pending[pending_count++] = (pending){taps, (uint32_t)i};
             continue;
@@ -319,8 +324,7 @@ static uint32_t slow_lookup(const lx_gather_settings *settings, const flight *f,
     const lx_lookup_surface *surface = &settings->lookup->surfaces[hit->surface];
     if (!s->front || !surface->triangles || surface->triangles[hit->triangle].chart == LX_NO_CHART) return LX_NO_LUXEL;
     if (hit->t < settings->near_texels * surface->texel_m && f->vertex < near_until) return LX_NO_LUXEL;
-    const uint32_t random = lx_hash32(dimension_key(f->stream, f->vertex, 0) ^ (f->sample * 0x9e3779b9u));
-    return lx_lookup_luxel(settings->lookup, lx_lookup_taps(settings->lookup, hit, random));
+    return lx_lookup_luxel(settings->lookup, lx_lookup_taps(settings->lookup, hit, tap_bits(f->stream, f->vertex, f->sample)));
 }
 
 static lx_result add_slow_row(const lx_gather_settings *settings, const flight *f, uint32_t luxel, const lx_gather_output *out, lx_error *error)

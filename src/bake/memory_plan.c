@@ -14,7 +14,7 @@ static const struct {
     uint32_t extra;           // and what paths that went on found, on average
     uint32_t sum;             // estimate of the sum of all layers
     uint32_t estimate;        // and layer: direct and indirect light
-    uint32_t row;             // and layer, layers padded: direct light, and radiosity of two passes, three half floats each
+    uint32_t row;             // and layer, layers padded: radiosity, and what two passes add to it
     // Per texel of the pages:
     uint32_t place;
     // Per tile and layer:
@@ -29,7 +29,7 @@ static const struct {
     .extra = 40,
     .sum = 5 * sizeof(float),
     .estimate = 2 * sizeof(lx_estimate),
-    .row = 3 * 3 * sizeof(uint16_t),
+    .row = 3 * sizeof(float) + 2 * 3 * sizeof(uint16_t),
     .place = 2 * sizeof(uint32_t),
     .tile = 2 * sizeof(double) + sizeof(uint32_t) + 1,
     .batches = 4 << 20,
