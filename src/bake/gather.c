@@ -25,8 +25,9 @@
 enum {
     tile_luxels = lx_luxel_tile_edge * lx_luxel_tile_edge,
     chunk_luxels = 256,    // of a tile, whose sums are at work at a time
-    first_round = 16,      // rays a luxel
+    first_round = 32,      // rays a luxel
     largest_round = 256,
+    enough_luxels = 64,    // of a tile, to tell its error from one pair of halves each
     rays_per_site = 8,     // in a round
     most_pass_rays = 32,
     most_passes = 1000,
@@ -480,7 +481,7 @@ static lx_result gather_tile(void *user, size_t task, uint32_t worker, lx_error 
     return LX_OK;
 }
 
-// After the second round layers begin to be done.
+// One luxel's halves tell little of its variance; those of a tile tell enough for layers to be done.
 static lx_result judge_tile(void *user, size_t task, uint32_t worker, lx_error *error)
 {
     (void)error;
@@ -489,6 +490,7 @@ static lx_result judge_tile(void *user, size_t task, uint32_t worker, lx_error *
     gather_scratch *s = &g->scratch[worker];
     if (state->done) return LX_OK;
     list_luxels(g, &g->job->map.tiles[task], s);
+    if (g->round_first == 0 && s->count < enough_luxels) return LX_OK;
     bool all = true;
     for (uint32_t l = 0; l < g->layer_count; ++l) {
         if (!state->frozen[l] && tile_error(g, s, l) <= (double)g->bake->desc.noise) state->frozen[l] = 1;
@@ -532,12 +534,10 @@ static lx_result run_rounds(gather_job *g, double deadline, lx_error *error)
         part.share = (double)g->round_count / desc->samples;
         LX_TRY(lx_pool_run_weighted(pool, job->map.tile_count, job->tile_weights, gather_tile, g, "gather", &sink, error));
         done += g->round_count;
-        if (g->round_first == 0) {
-            find_layer_means(g);
-            continue;
-        }
+        if (g->round_first == 0) find_layer_means(g);
         if (desc->noise > 0) LX_TRY(lx_pool_run(pool, job->map.tile_count, judge_tile, g, "gather", NULL, error));
-        const double now = lx_seconds(), next = (now - round_start) * (double)done / (double)g->round_count;
+        const uint32_t upcoming = done < largest_round ? done : largest_round;
+        const double now = lx_seconds(), next = (now - round_start) * (double)upcoming / (double)g->round_count;
         if (desc->time_s > 0 && now + next > deadline) break;
         bool all = true;
         for (uint32_t t = 0; t < job->map.tile_count; ++t) all &= g->tiles[t].done;
