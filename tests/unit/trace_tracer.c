@@ -5,18 +5,21 @@
 
 enum { triangles = 200, rays = 1000 };
 
-static float unit(uint32_t index)
+// Three numbers in [0, 1), one place after the other.
+static lx_vec3 next_three(uint32_t *n)
 {
-    return lx_unit_float(lx_hash32(index * 2 + 1));
+    float v[3];
+    for (int k = 0; k < 3; ++k) v[k] = lx_unit_float(lx_hash32(++*n * 2 + 1));
+    return (lx_vec3){v[0], v[1], v[2]};
 }
 
 static lx_tracer *make_soup(lx_scene **scene)
 {
     bin_clear();
     for (uint32_t t = 0, n = 0; t < triangles; ++t) {
-        const lx_vec3 centre = {unit(++n), unit(++n), unit(++n)};
+        const lx_vec3 centre = next_three(&n);
         for (int k = 0; k < 3; ++k) {
-            const lx_vec3 d = {unit(++n) - 0.5f, unit(++n) - 0.5f, unit(++n) - 0.5f};
+            const lx_vec3 d = lx_sub(next_three(&n), (lx_vec3){0.5f, 0.5f, 0.5f});
             BIN_FLOATS(centre.x + 0.3f * d.x, centre.y + 0.3f * d.y, centre.z + 0.3f * d.z);
         }
     }
@@ -31,8 +34,8 @@ static lx_tracer *make_soup(lx_scene **scene)
 static void make_rays(lx_ray *out)
 {
     for (uint32_t i = 0, n = 1u << 20; i < rays; ++i) {
-        const lx_vec3 from = {3 * unit(++n) - 1.5f, 2 * unit(++n) - 0.5f, 2 * unit(++n) - 0.5f};
-        const lx_vec3 to = {2 * unit(++n) - 1, unit(++n), unit(++n)};
+        const lx_vec3 a = next_three(&n), b = next_three(&n);
+        const lx_vec3 from = {3 * a.x - 1.5f, 2 * a.y - 0.5f, 2 * a.z - 0.5f}, to = {2 * b.x - 1, b.y, b.z};
         out[i] = (lx_ray){.origin = from, .direction = lx_sub(to, from), .t_max = INFINITY};
     }
 }
