@@ -47,7 +47,6 @@ typedef struct gather_scratch {
     lx_rgb *mean;           // [cells][tile_luxels] of one source
     float *variance;
     uint32_t *found;        // [tile_luxels][most_pass_rays]
-    uint32_t back_hits[tile_luxels];
     uint32_t stream[tile_luxels], chart[tile_luxels];
     uint16_t place[tile_luxels];
     uint32_t luxel[tile_luxels]; // of the map
@@ -57,8 +56,7 @@ typedef struct gather_scratch {
 // What a round knows of a tile.
 typedef struct tile_state {
     bool done;
-    uint32_t *samples; // [layer] rays that went into the layer's estimates; a layer that is done keeps its number
-    uint8_t *frozen;   // [layer]
+    uint8_t *frozen; // [layer] sure enough: its estimates stay as they are
 } tile_state;
 
 // What all layers at their authored colours add up to in a luxel, and how sure that is.
@@ -177,11 +175,10 @@ static void add_source(const gather_job *g, gather_scratch *s, uint32_t source, 
 {
     const lx_source_use *use = &g->uses[source];
     const uint32_t cells = lx_tracer_cell_count(g->bake->tracer, source);
-    const float least = (use->weight.r + use->weight.g + use->weight.b) / 3;
     for (uint32_t cell = 0; cell < cells; ++cell) {
         const uint32_t layer = (uint32_t)use->layer + (use->cells ? 0 : cell);
         const lx_rgb weight = use->cells ? lx_rgb_mul(use->weight, use->cells[cell]) : use->weight;
-        const float grey = use->cells ? (weight.r + weight.g + weight.b) / 3 : least;
+        const float grey_weight = (weight.r + weight.g + weight.b) / 3;
         const float unit = g->scales[layer];
         lx_estimate *estimates = g->direct + (size_t)layer * g->luxel_count;
         for (uint32_t i = 0; i < s->count; ++i) {
@@ -193,9 +190,18 @@ static void add_source(const gather_job *g, gather_scratch *s, uint32_t source, 
             if (!counts) continue;
             lx_estimate *estimate = &estimates[s->luxel[i]];
             estimate->mean = lx_rgb_add(estimate->mean, e);
-            estimate->variance += s->variance[(size_t)cell * s->count + i] * grey * grey;
+            estimate->variance += s->variance[(size_t)cell * s->count + i] * grey_weight * grey_weight;
         }
     }
+}
+
+// Extras of a tile lie in the order in which paths ended; they are added after the luxel's plain hits, luxel by luxel.
+static int compare_extras(const void *a, const void *b)
+{
+    const lx_gather_extra *x = a, *y = b;
+    if (x->target != y->target) return x->target < y->target ? -1 : 1;
+    if (x->luxel != y->luxel) return x->luxel < y->luxel ? -1 : 1;
+    return memcmp(&x->weight, &y->weight, sizeof x->weight);
 }
 
 static lx_result light_tile(void *user, size_t task, uint32_t worker, lx_error *error)
@@ -228,7 +234,6 @@ static lx_result light_tile(void *user, size_t task, uint32_t worker, lx_error *
     for (size_t i = 0; i < g->stride * s->count; ++i) s->sums[i] *= 1 / ray_unit;
     const lx_gather_settings ray_settings = {.tracer = g->bake->tracer, .lookup = &g->lookup, .uses = g->uses, .scales = g->scales,
                                              .row_layers = g->row_layers, .bounces = g->settings.bounces, .everything = true, .near_texels = pass_near_texels};
-    memset(s->back_hits, 0, sizeof s->back_hits);
     for (uint32_t first = 0; first < s->count; first += chunk_luxels) {
         const uint32_t end = first + chunk_luxels < s->count ? first + chunk_luxels : s->count;
         size_t count = 0;
@@ -236,7 +241,7 @@ static lx_result light_tile(void *user, size_t task, uint32_t worker, lx_error *
             for (uint32_t k = 0; k < g->pass_rays; ++k)
                 s->starts[count++] = (lx_gather_start){.receiver = &s->sites[i * lx_site_count + k % lx_site_count],
                                                        .stream = s->stream[i] ^ cache_stream, .sample = k, .target = i};
-        const lx_gather_output out = {.sums = s->sums, .back_hits = s->back_hits, .luxels = s->found, .extras = &g->extras[task]};
+        const lx_gather_output out = {.sums = s->sums, .luxels = s->found, .extras = &g->extras[task]};
         const lx_result result = lx_gather_trace(s->batch, &ray_settings, s->starts, count, &out, error);
         if (result != LX_OK) return result;
         for (uint32_t i = first; i < end; ++i)
@@ -255,29 +260,13 @@ static lx_result light_tile(void *user, size_t task, uint32_t worker, lx_error *
             }
     }
     // From numbers within the tile's list to luxels.
-    for (size_t k = 0; k < g->extras[task].count; ++k) g->extras[task].items[k].target = s->luxel[g->extras[task].items[k].target];
+    lx_gather_extras *extras = &g->extras[task];
+    for (size_t k = 0; k < extras->count; ++k) extras->items[k].target = s->luxel[extras->items[k].target];
+    if (extras->count) qsort(extras->items, extras->count, sizeof *extras->items, compare_extras);
     return LX_OK;
 }
 
 // ---- passes -------------------------------------------------------------------------------------------------------------------------
-
-// Extras of a tile lie in the order in which paths ended; they are added after the luxel's plain hits, luxel by luxel.
-static int compare_extras(const void *a, const void *b)
-{
-    const lx_gather_extra *x = a, *y = b;
-    if (x->target != y->target) return x->target < y->target ? -1 : 1;
-    if (x->luxel != y->luxel) return x->luxel < y->luxel ? -1 : 1;
-    return memcmp(&x->weight, &y->weight, sizeof x->weight);
-}
-
-static lx_result sort_extras(void *user, size_t task, uint32_t worker, lx_error *error)
-{
-    (void)worker;
-    (void)error;
-    const gather_job *g = user;
-    if (g->extras[task].count) qsort(g->extras[task].items, g->extras[task].count, sizeof *g->extras[task].items, compare_extras);
-    return LX_OK;
-}
 
 static lx_result pass_tile(void *user, size_t task, uint32_t worker, lx_error *error)
 {
@@ -461,7 +450,7 @@ static lx_result gather_tile(void *user, size_t task, uint32_t worker, lx_error 
 {
     const gather_job *g = user;
     const lx_luxel_tile *tile = &g->job->map.tiles[task];
-    tile_state *state = &g->tiles[task];
+    const tile_state *state = &g->tiles[task];
     gather_scratch *s = &g->scratch[worker];
     if (state->done) return LX_OK;
     list_luxels(g, tile, s);
@@ -471,13 +460,11 @@ static lx_result gather_tile(void *user, size_t task, uint32_t worker, lx_error 
         const uint32_t end = first + chunk < s->count ? first + chunk : s->count;
         memset(s->sums, 0, 2 * chunk_luxels * g->stride * sizeof *s->sums);
         const size_t count = make_starts(g, s, first, end);
-        const lx_gather_output out = {.sums = s->sums, .back_hits = s->back_hits};
+        const lx_gather_output out = {.sums = s->sums};
         const lx_result result = lx_gather_trace(s->batch, &g->settings, s->starts, count, &out, error);
         if (result != LX_OK) return result;
         for (uint32_t i = first; i < end; ++i) fold(g, state, s, i, i - first);
     }
-    for (uint32_t l = 0; l < g->layer_count; ++l)
-        if (!state->frozen[l]) state->samples[l] = g->round_first + g->round_count;
     return LX_OK;
 }
 
@@ -614,7 +601,6 @@ static void release_cache(gather_job *g, uint32_t workers)
 static void release(gather_job *g)
 {
     for (uint32_t t = 0; g->tiles && t < g->job->map.tile_count; ++t) {
-        lx_free(g->tiles[t].samples);
         lx_free(g->tiles[t].frozen);
     }
     void *arrays[] = {g->scales, g->authored, g->direct, g->indirect, g->pass_change, g->pass_energy, g->converged, g->tiles, g->layer_means};
@@ -645,9 +631,8 @@ static lx_result allocate(gather_job *g, lx_error *error)
         !g->pass_change || !g->pass_energy || !g->converged || !g->tiles || !g->layer_means)
         return lx_fail_memory(error, "layers; --memory bakes them in groups");
     for (size_t t = 0; t < tiles; ++t) {
-        g->tiles[t].samples = lx_calloc_array(layers, sizeof *g->tiles[t].samples);
         g->tiles[t].frozen = lx_calloc_array(layers, 1);
-        if (!g->tiles[t].samples || !g->tiles[t].frozen) return lx_fail_memory(error, "layers");
+        if (!g->tiles[t].frozen) return lx_fail_memory(error, "layers");
     }
     return LX_OK;
 }
@@ -743,7 +728,6 @@ static lx_result bake_group(lx_bake_job *job, uint32_t first, uint32_t count, lx
     LX_TRY(lx_pool_run_weighted(pool, job->map.tile_count, job->tile_weights, light_tile, &g, "direct", job->progress, error));
     job->stages.direct += lx_lap(&stage_start);
     if (bounces > 0) {
-        LX_TRY(lx_pool_run(pool, job->map.tile_count, sort_extras, &g, "cache", NULL, error));
         LX_TRY(run_passes(&g, bounces == LX_BOUNCES_INF ? bounces : bounces - 1, error));
     }
     job->stages.cache += lx_lap(&stage_start);

@@ -23,7 +23,7 @@ enum { gather_key = 0x67617468 }; // keeps the streams of gather rays apart from
 typedef struct flight {
     lx_rgb throughput;
     float cosine; // at the receiver
-    uint32_t stream, sample, target, start;
+    uint32_t stream, sample, target;
     uint32_t vertex, passes;
     uint32_t last_surface, last_triangle;
 } flight;
@@ -31,7 +31,7 @@ typedef struct flight {
 typedef struct vertex_record {
     lx_receiver receiver;
     lx_rgb throughput;
-    uint32_t stream, sample, target, start, number;
+    uint32_t stream, sample, target, number;
 } vertex_record;
 
 typedef struct pending {
@@ -249,13 +249,8 @@ static void first_hits(lx_gather_batch *b, const lx_gather_settings *settings, c
             add_sky(settings, out, (lx_rgb){1, 1, 1}, b->cosines[i], start->target, b->rays[i].direction, 0);
             continue;
         }
-        if (out->inverse_distance) out->inverse_distance[start->target] += 1 / hit->t;
         const lx_lookup_surface *surface = &settings->lookup->surfaces[hit->surface];
-        if (surface->plain && hit->back && !surface->double_sided) {
-            ++out->back_hits[start->target];
-            continue;
-        }
-        if (surface->plain && settings->bounces == 0) continue;
+        if (surface->plain && ((hit->back && !surface->double_sided) || settings->bounces == 0)) continue; // black
         const bool may_look_up = surface->plain && surface->triangles && !hit->back && hit->t >= settings->near_texels * surface->texel_m &&
                                  surface->triangles[hit->triangle].chart != LX_NO_CHART;
         if (may_look_up) {
@@ -265,7 +260,7 @@ static void first_hits(lx_gather_batch *b, const lx_gather_settings *settings, c
             continue;
         }
         const flight f = {.throughput = {1, 1, 1}, .cosine = b->cosines[i], .stream = start->stream, .sample = start->sample,
-                          .target = start->target, .start = first_start + b->found[i], .last_surface = LX_MISS};
+                          .target = start->target, .last_surface = LX_MISS};
         send(b, &b->rays[i], hit, &f);
     }
     size_t found_count = 0;
@@ -275,7 +270,7 @@ static void first_hits(lx_gather_batch *b, const lx_gather_settings *settings, c
         const uint32_t luxel = lx_lookup_luxel(settings->lookup, b->pending[k].taps);
         if (luxel == LX_NO_LUXEL) {
             const flight f = {.throughput = {1, 1, 1}, .cosine = b->cosines[i], .stream = start->stream, .sample = start->sample,
-                              .target = start->target, .start = first_start + b->found[i], .last_surface = LX_MISS};
+                              .target = start->target, .last_surface = LX_MISS};
             send(b, &b->rays[i], &b->hits[i], &f);
         } else if (out->luxels) {
             out->luxels[first_start + b->found[i]] = luxel;
@@ -314,7 +309,7 @@ static bool make_vertex(const flight *f, const lx_shading *s, vertex_record *out
     if (!(lx_rgb_max(throughput) > 0)) return false;
     const float side = s->front ? 1.0f : -1.0f;
     *out = (vertex_record){.receiver = {s->position, lx_scale(s->normal, side), lx_scale(s->geometric_normal, side)}, .throughput = throughput,
-                           .stream = f->stream, .sample = f->sample, .target = f->target, .start = f->start, .number = f->vertex + 1};
+                           .stream = f->stream, .sample = f->sample, .target = f->target, .number = f->vertex + 1};
     return true;
 }
 
@@ -431,11 +426,7 @@ static lx_result step(lx_gather_batch *b, const lx_gather_settings *settings, co
             b->slow_rays[kept++] = ray;
             continue;
         }
-        if (!s->lit) {
-            if (f.vertex == 0) ++out->back_hits[f.target];
-            continue;
-        }
-        if (f.vertex >= settings->bounces) continue;
+        if (!s->lit || f.vertex >= settings->bounces) continue;
         const uint32_t luxel = slow_lookup(settings, &f, hit, s);
         if (luxel != LX_NO_LUXEL) {
             const lx_result result = add_slow_row(settings, &f, luxel, out, error);
@@ -454,7 +445,7 @@ static lx_result step(lx_gather_batch *b, const lx_gather_settings *settings, co
         b->slow_rays[kept] = (lx_ray){.origin = lx_offset_origin(v->receiver.position, v->receiver.geometric_normal), .direction = direction,
                                       .t_max = INFINITY};
         b->flights[kept++] = (flight){.throughput = v->throughput, .cosine = local.z, .stream = v->stream, .sample = v->sample, .target = v->target,
-                                      .start = v->start, .vertex = v->number, .last_surface = LX_MISS};
+                                      .vertex = v->number, .last_surface = LX_MISS};
     }
     lx_trace_closest(settings->tracer, b->slow_rays, b->slow_hits, kept);
     b->ray_count += kept;

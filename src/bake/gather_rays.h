@@ -45,8 +45,6 @@ typedef struct lx_gather_extras {
 
 typedef struct lx_gather_output {
     float *sums;             ///< [target][3][row_layers], added to.
-    uint32_t *back_hits;     ///< [target] first rays that met the black side of a surface, added to.
-    float *inverse_distance; ///< [target] sum of 1 / distance of first hits, added to; NULL: not asked for.
     uint32_t *luxels;        ///< Recording (no rows are read): [start] luxel that the first hit may be looked up at, else LX_NO_LUXEL. NULL: rows are added.
     lx_gather_extras *extras; ///< Recording: later hits.
 } lx_gather_output;

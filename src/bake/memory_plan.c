@@ -31,7 +31,7 @@ static const struct {
     .estimate = 2 * sizeof(lx_estimate),
     .row = 3 * sizeof(float) + 2 * 3 * sizeof(uint16_t),
     .place = 2 * sizeof(uint32_t),
-    .tile = 2 * sizeof(double) + sizeof(uint32_t) + 1,
+    .tile = 2 * sizeof(double) + 1,
     .batches = 4 << 20,
     .worker_row = lx_luxel_tile_edge * lx_luxel_tile_edge * 3 * sizeof(float),
     .worker_cell = lx_luxel_tile_edge * lx_luxel_tile_edge * (sizeof(lx_rgb) + sizeof(float)),
