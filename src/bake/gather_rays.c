@@ -339,16 +339,7 @@ static lx_result add_slow_row(const lx_gather_settings *settings, const flight *
     return LX_OK;
 }
 
-// Skips what can bring little compared with what the source gives the scene on average: the light of a vertex is but one of a luxel's many rays.
-// Depends on the path and the source alone. Returns 1 / probability; 0: skipped.
-static float roulette(const vertex_record *v, uint32_t key, float brings, float scale)
-{
-    if (!(brings < scale)) return 1;
-    const float probability = brings / scale;
-    const uint32_t bits = lx_hash_combine(lx_hash_combine(v->stream, key), v->sample);
-    return lx_unit_float(bits) < probability ? 1 / probability : 0;
-}
-
+// The light of a vertex is but one of a luxel's many rays: roulette skips more of it than the path integrator does.
 static bool sample_light(const lx_gather_settings *settings, uint32_t source, const vertex_record *v, lx_ray *ray, lx_rgb *light, uint32_t *cell)
 {
     enum { scale_factor = 200 }; // source_scales are a twentieth of the mean
@@ -361,12 +352,12 @@ static bool sample_light(const lx_gather_settings *settings, uint32_t source, co
     const lx_source_sphere *sphere = &tracer->source_spheres[source];
     if (!(bound < INFINITY) && sphere->power < INFINITY && sphere->radius > 0) bound = 4 * sphere->power / (sphere->radius * sphere->radius);
     const float brightness = lx_rgb_max(v->throughput);
-    const float chance = roulette(v, key ^ 0x68bc21ebu, brightness * bound, scale);
+    const float chance = lx_light_roulette(v->stream, v->sample, key ^ 0x68bc21ebu, brightness * bound, scale);
     if (chance == 0) return false;
     const lx_vec2 u = lx_sobol_pair(v->sample, lx_hash_combine(v->stream, key));
     if (!lx_sample_source(tracer, source, &v->receiver, u, 1, ray, light, cell)) return false;
     *light = lx_rgb_scale(*light, chance);
-    const float again = roulette(v, key ^ 0x02e5be93u, brightness * lx_rgb_max(*light), scale);
+    const float again = lx_light_roulette(v->stream, v->sample, key ^ 0x02e5be93u, brightness * lx_rgb_max(*light), scale);
     *light = lx_rgb_scale(*light, again);
     return again > 0;
 }

@@ -6,6 +6,7 @@
 // density bounded right up to the disk. From far away both are sampled by area. Spheres by their visible cap ([PBR4] 6.2.4).
 #include "trace/light_sample.h"
 
+#include "math/hash.h"
 #include "trace/sampling.h"
 #include "trace/tracer_data.h"
 
@@ -236,6 +237,14 @@ bool lx_sample_source(const lx_tracer *tracer, uint32_t source, const lx_receive
     }
     *out_irradiance = lx_rgb_grey(irradiance);
     return arrives;
+}
+
+float lx_light_roulette(uint32_t stream, uint32_t sample, uint32_t key, float brings, float scale)
+{
+    if (!(brings < scale)) return 1;
+    const float probability = brings / scale;
+    const uint32_t bits = lx_hash_combine(lx_hash_combine(stream, key), sample);
+    return lx_unit_float(bits) < probability ? 1 / probability : 0;
 }
 
 float lx_hit_weight(const lx_tracer *tracer, const lx_ray *ray, const lx_hit *hit, lx_vec3 hit_normal, float cosine, uint32_t count)

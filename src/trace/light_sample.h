@@ -22,6 +22,10 @@ bool lx_sample_source(const lx_tracer *tracer, uint32_t source, const lx_receive
 /// the cone or the range, behind a one-sided lamp), infinity if nothing is known. Within the source's own bounds it is infinity too.
 float lx_source_bound(const lx_tracer *tracer, uint32_t source, const lx_receiver *receiver);
 
+/// Roulette on light samples: what brings less than `scale` is looked at with that probability and weighs accordingly more, so the expectation stays.
+/// Depends on the path (stream, sample) and its source (key) alone, never on other sources. 1 / probability; 0: skipped.
+float lx_light_roulette(uint32_t stream, uint32_t sample, uint32_t key, float brings, float scale);
+
 /// Weight of an emissive hit found by a cosine-weighted ray from `receiver`, against `count` samples of lx_sample_source. `cosine`: of the
 /// ray at the receiver.
 float lx_hit_weight(const lx_tracer *tracer, const lx_ray *ray, const lx_hit *hit, lx_vec3 hit_normal, float cosine, uint32_t count);

@@ -91,18 +91,6 @@ static bool counts(const lx_path_settings *settings, const lx_source_use *use, u
     return vertex == 0 ? settings->direct && use->direct : settings->indirect;
 }
 
-// Roulette on light samples after the first bounce: in a room of many lamps most of them are far away from any one vertex, and what a sample
-// could bring is far below the noise of the path itself. What brings less than the source's scale is looked at with that
-// probability and weighs accordingly more, so the expectation stays. Depends on the path and its source alone, never on other sources.
-// Returns 1 / probability, 0 if the sample is skipped.
-static float roulette(const path *p, uint32_t key, float brings, float scale)
-{
-    if (!(brings < scale)) return 1;
-    const float probability = brings / scale;
-    const uint32_t bits = lx_hash_combine(lx_hash_combine(p->stream, key), p->sample);
-    return lx_unit_float(bits) < probability ? 1 / probability : 0;
-}
-
 // How many light samples a source gets at a vertex. A matter of the source alone: what its cells are used for changes nothing.
 static uint32_t light_sample_count(const lx_tracer *tracer, uint32_t source, uint32_t vertex)
 {
@@ -110,6 +98,8 @@ static uint32_t light_sample_count(const lx_tracer *tracer, uint32_t source, uin
     return vertex > 0 ? 1 : wanted < most_light_samples ? wanted : most_light_samples;
 }
 
+// After the first bounce roulette decides: in a room of many lamps most of them are far away from any one vertex, and what a sample could bring is far
+// below the noise of the path itself.
 // One light sample (number `turn` of `count`) for one path. First by what the source could bring at most, before anything is sampled; then by what the sample does bring.
 static bool sample_light(const lx_tracer *tracer, uint32_t source, const path *p, uint32_t vertex, uint32_t turn, uint32_t count,
                          lx_ray *ray, lx_rgb *light, uint32_t *cell)
@@ -118,13 +108,13 @@ static bool sample_light(const lx_tracer *tracer, uint32_t source, const path *p
     const float bound = lx_source_bound(tracer, source, &p->receiver), scale = tracer->source_scales[source];
     if (bound == 0) return false;
     const float brightness = lx_rgb_max(p->throughput);
-    const float chance = vertex > 0 ? roulette(p, key ^ 0x68bc21ebu, brightness * bound, scale) : 1;
+    const float chance = vertex > 0 ? lx_light_roulette(p->stream, p->sample, key ^ 0x68bc21ebu, brightness * bound, scale) : 1;
     if (chance == 0) return false;
     const lx_vec2 u = lx_sobol_pair(p->sample * count + turn, lx_hash_combine(p->stream, key));
     if (!lx_sample_source(tracer, source, &p->receiver, u, count, ray, light, cell)) return false;
     *light = lx_rgb_scale(*light, chance / (float)count);
     if (vertex == 0) return true;
-    const float again = roulette(p, key ^ 0x02e5be93u, brightness * lx_rgb_max(*light), scale);
+    const float again = lx_light_roulette(p->stream, p->sample, key ^ 0x02e5be93u, brightness * lx_rgb_max(*light), scale);
     *light = lx_rgb_scale(*light, again);
     return again > 0;
 }
