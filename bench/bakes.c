@@ -12,11 +12,13 @@
 // the integrator's noise and by nothing else. The linker's --wrap does that; nothing in the product knows of it.
 #include "bake/bake.h"
 #include "bake/finished.h"
+#include "bake/gather_rays.h"
 #include "bake/luxels.h"
 #include "base/clock.h"
 #include "base/error.h"
 #include "image/image.h"
 #include "math/hash.h"
+#include "trace/direct.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -56,6 +58,14 @@ void __real_lx_path_trace(lx_path_batch *batch, const lx_path_settings *settings
                           uint32_t *back_hits);
 void __wrap_lx_path_trace(lx_path_batch *batch, const lx_path_settings *settings, const lx_path_start *starts, size_t count, double *sums,
                           uint32_t *back_hits);
+lx_result __real_lx_gather_trace(lx_gather_batch *batch, const lx_gather_settings *settings, const lx_gather_start *starts, size_t count,
+                                 const lx_gather_output *output, lx_error *error);
+lx_result __wrap_lx_gather_trace(lx_gather_batch *batch, const lx_gather_settings *settings, const lx_gather_start *starts, size_t count,
+                                 const lx_gather_output *output, lx_error *error);
+bool __real_lx_direct_light(lx_direct_batch *batch, const lx_direct_settings *settings, const lx_direct_tile *tile, uint32_t source, lx_rgb *mean,
+                            float *variance);
+bool __wrap_lx_direct_light(lx_direct_batch *batch, const lx_direct_settings *settings, const lx_direct_tile *tile, uint32_t source, lx_rgb *mean,
+                            float *variance);
 void __real_lx_luxels_release(lx_luxel_page *page);
 void __wrap_lx_luxels_release(lx_luxel_page *page);
 
@@ -72,6 +82,32 @@ void __wrap_lx_path_trace(lx_path_batch *batch, const lx_path_settings *settings
         salted[i].stream = lx_hash_combine(starts[i].stream, salt);
     }
     __real_lx_path_trace(batch, settings, salted, count, sums, back_hits);
+}
+
+lx_result __wrap_lx_gather_trace(lx_gather_batch *batch, const lx_gather_settings *settings, const lx_gather_start *starts, size_t count,
+                                 const lx_gather_output *output, lx_error *error)
+{
+    if (!salt) return __real_lx_gather_trace(batch, settings, starts, count, output, error);
+    lx_gather_start *salted = malloc((count + 1) * sizeof *salted);
+    if (!salted) abort();
+    for (size_t i = 0; i < count; ++i) {
+        salted[i] = starts[i];
+        salted[i].stream = lx_hash_combine(starts[i].stream, salt);
+    }
+    const lx_result result = __real_lx_gather_trace(batch, settings, salted, count, output, error);
+    free(salted);
+    return result;
+}
+
+bool __wrap_lx_direct_light(lx_direct_batch *batch, const lx_direct_settings *settings, const lx_direct_tile *tile, uint32_t source, lx_rgb *mean,
+                            float *variance)
+{
+    if (!salt) return __real_lx_direct_light(batch, settings, tile, source, mean, variance);
+    uint32_t streams[lx_luxel_tile_edge * lx_luxel_tile_edge];
+    for (uint32_t i = 0; i < tile->count; ++i) streams[i] = lx_hash_combine(tile->stream[i], salt);
+    lx_direct_tile salted = *tile;
+    salted.stream = streams;
+    return __real_lx_direct_light(batch, settings, &salted, source, mean, variance);
 }
 
 // The last moment at which a bake knows which texels lie inside solid geometry.
