@@ -1,4 +1,11 @@
 // The denoiser's filter: see denoise.h.
+//
+// 1. Variances, as half buffers tell them, are pooled over neighbours, and lowered where differences between neighbours are smaller than
+//    they say.
+// 2. Candidates: the light at widths of up to 31 texels, for direct light also along each axis of the grid alone.
+// 3. For each luxel the mixture of the input and the candidates that has the least squared error around it. What a candidate differs from the
+//    input, squared, is known; how much of that difference is the input's noise is the variance times the weight that the luxel itself
+//    does not have in the candidate. That is all it takes: linear equations, as many as candidates.
 #include "post/denoise_graph.h"
 
 #include "base/memory.h"
@@ -8,38 +15,48 @@
 enum {
     direction_count = lx_denoise_direction_count,
     level_count = lx_denoise_level_count,
-    candidate_count = level_count + 1, // the input, then what each level made of it
+    narrow_levels = 3,                                // along one axis
+    most_candidates = level_count + 2 * narrow_levels,
+    pool_levels = 3,                                  // over which products of differences, and variances, are pooled
+    most_products = most_candidates * (most_candidates + 1) / 2 + 1, // and a weight
+    block_luxels = 1024,  // mixed at a time
+    region_luxels = 4096, // what a block's pools reach; one luxel's reach 729
 };
 
-// Differences of so many standard deviations beyond the noise lower a weight to a quarter.
-static const float tolerances[] = {[lx_light_direct] = 1.5f, [lx_light_indirect] = 3.0f};
-// Below the first relative standard error a luxel counts as clean and stays, above the second nothing holds the filter back.
-static const float clean_error = 0.003f, noisy_error = 0.008f;
-// Variances come from samples that are spread better than chance within each half; what they say of the whole is on the high side. So much
-// of it counts where the filter is compared with the input.
-static const float trusted_variance = 0.85f;
+enum { every_axis = -1 }; // else 0 or 2: the direction along it
 
+// A neighbour without one on the other side would tilt a slope: so much of its weight counts.
+static const float unpaired_share = 0.2f;
 // By how much the variance beside a bright spot may exceed what the value suggests; and the share of a luxel's own variance that counts at least.
 static const float contrast = 6, own_share = 0.25f;
 static const float unsure = 0.05f; // relative variance at which a luxel's own value and its neighbourhood's count alike
-static const float most_error = 16; // in variances: one luxel must not decide for its neighbourhood
+// Direct light beside a penumbra has no noise: not even a luxel's few samples would hide so much of theirs.
+static const float most_hidden = 8;
+// Differences between neighbours tell of noise up to so many times what variances expect, and lower these to a tenth at most.
+static const float most_difference = 4, least_calm = 0.1f;
+// Covariances come from some tens of luxels: their diagonals are raised by a share, and by that of the noise.
+static const float ridge = 0.2f, ridge_of_noise = 0.01f;
 
-// Estimated squared errors of the candidates, in units of the input's variance.
-typedef struct errors {
-    float of[candidate_count];
-} errors;
+// The kernel [1 2 1; 2 4 2; 1 2 1] / 16 in the links' order, over 15 for their weights.
+static const float kernel_center = 0.25f;
+static const float kernel[direction_count] = {0.125f / 15, 0.0625f / 15, 0.125f / 15, 0.0625f / 15,
+                                              0.125f / 15, 0.0625f / 15, 0.125f / 15, 0.0625f / 15};
 
-// What the first level compares: a luxel and its neighbours in one, which single outliers do not rule.
-typedef struct pilot {
-    float value, variance;
-} pilot;
+// What pools of one block of luxels need: the block, then what each level further out reaches.
+typedef struct region {
+    uint32_t *slot;                 // [luxel] place in the list; LX_NO_LUXEL: not in it
+    uint32_t list[region_luxels];
+    uint32_t end[pool_levels + 1];  // [0]: the block
+    float products[2][region_luxels * most_products];
+} region;
 
 typedef struct work {
     const lx_denoise_graph *graph;
-    float tolerance;
-    lx_estimate *levels[candidate_count]; // [luxel] the input with smooth variances, then one level's output each
-    errors *errors, *other_errors;        // [luxel]
-    pilot *pilots;                        // [luxel]
+    uint32_t candidate_count;
+    bool may_sharpen;            // weights below zero: kernels that keep curvature
+    lx_rgb *candidates[most_candidates]; // [luxel]
+    float *variances;            // [luxel]
+    region *region;
 } work;
 
 static float mean_of(lx_rgb c) { return (c.r + c.g + c.b) * (1.0f / 3); }
@@ -49,26 +66,49 @@ static const uint32_t *links_at(const lx_denoise_graph *graph, int level)
     return graph->links + (size_t)level * graph->luxel_count * direction_count;
 }
 
-// The kernel [1 2 1; 2 4 2; 1 2 1] / 16 in the links' order, over 15 for their weights.
-static const float kernel_center = 0.25f;
-static const float kernel[direction_count] = {0.125f / 15, 0.0625f / 15, 0.125f / 15, 0.0625f / 15,
-                                              0.125f / 15, 0.0625f / 15, 0.125f / 15, 0.0625f / 15};
-
 size_t lx_denoise_scratch_bytes(const lx_denoise_graph *graph)
 {
-    return (size_t)graph->luxel_count * (candidate_count * sizeof(lx_estimate) + 2 * sizeof(errors) + sizeof(pilot));
+    return sizeof(region) + (size_t)graph->luxel_count * (most_candidates * sizeof(lx_rgb) + sizeof(float) + sizeof(uint32_t));
 }
 
 static work lay_out(const lx_denoise_graph *graph, lx_light_part part, void *scratch)
 {
-    work w = {.graph = graph, .tolerance = tolerances[part]};
-    lx_estimate *next = scratch;
-    for (int k = 0; k < candidate_count; ++k, next += graph->luxel_count) w.levels[k] = next;
-    w.errors = (errors *)(void *)next;
-    w.other_errors = w.errors + graph->luxel_count;
-    w.pilots = (pilot *)(void *)(w.other_errors + graph->luxel_count);
+    work w = {.graph = graph, .candidate_count = part == lx_light_direct ? most_candidates : level_count, .may_sharpen = part == lx_light_indirect};
+    const size_t count = graph->luxel_count;
+    w.region = scratch;
+    lx_rgb *next = (lx_rgb *)(void *)(w.region + 1);
+    for (int k = 0; k < most_candidates; ++k, next += count) w.candidates[k] = next;
+    w.variances = (float *)(void *)next;
+    w.region->slot = (uint32_t *)(void *)(w.variances + count);
+    memset(w.region->slot, 0xff, count * sizeof *w.region->slot);
     return w;
 }
+
+// Means over a luxel and its neighbours of `size` numbers each, for those that `list` names (NULL: all), at their place in it.
+static void pool(const lx_denoise_graph *graph, int level, const uint32_t *list, uint32_t count, const uint32_t *slot, size_t size,
+                 const float *restrict in, float *restrict out)
+{
+    const uint32_t *links = links_at(graph, level);
+    for (uint32_t i = 0; i < count; ++i) {
+        const uint32_t *link = links + (size_t)(list ? list[i] : i) * direction_count;
+        const float *restrict own = in + size * i;
+        float *restrict sum = out + size * i;
+        float total = kernel_center;
+        for (size_t k = 0; k < size; ++k) sum[k] = kernel_center * own[k];
+        for (int d = 0; d < direction_count; ++d) {
+            const float weight = kernel[d] * (float)(link[d] & lx_denoise_most_weight);
+            if (weight == 0) continue;
+            const uint32_t luxel = link[d] >> lx_denoise_weight_bits;
+            const float *restrict other = in + size * (slot ? slot[luxel] : luxel);
+            for (size_t k = 0; k < size; ++k) sum[k] += weight * other[k];
+            total += weight;
+        }
+        const float scale = 1 / total;
+        for (size_t k = 0; k < size; ++k) sum[k] *= scale;
+    }
+}
+
+// ---- variances ------------------------------------------------------------------------------------------------------------------
 
 // Variances of single luxels, from a few half buffers each, are mostly noise themselves. Means over the neighbourhood: of the variance, of its share of
 // the squared value, and of the value. Beside a bright spot the first is far too high for the dark, beside a dark spot the second for the
@@ -77,164 +117,303 @@ typedef struct spread {
     float absolute, relative, value;
 } spread;
 
-static void smooth_spread(const lx_denoise_graph *graph, int level, const spread *in, spread *out)
+static void pool_variances(const work *w, lx_light_part part, const lx_estimate *in)
 {
-    const uint32_t *link = links_at(graph, level);
-    for (uint32_t i = 0; i < graph->luxel_count; ++i, link += direction_count) {
-        spread sum = {kernel_center * in[i].absolute, kernel_center * in[i].relative, kernel_center * in[i].value};
-        float total = kernel_center;
-        for (int d = 0; d < direction_count; ++d) {
-            const float weight = kernel[d] * (float)(link[d] & lx_denoise_most_weight);
-            const spread other = in[link[d] >> lx_denoise_weight_bits];
-            sum.absolute += weight * other.absolute;
-            sum.relative += weight * other.relative;
-            sum.value += weight * other.value;
-            total += weight;
-        }
-        const float scale = 1 / total;
-        out[i] = (spread){sum.absolute * scale, sum.relative * scale, sum.value * scale};
+    const uint32_t count = w->graph->luxel_count;
+    spread *a = (spread *)(void *)w->candidates[0], *b = (spread *)(void *)w->candidates[1];
+    for (uint32_t i = 0; i < count; ++i) {
+        const float value = mean_of(in[i].mean), square = value * value;
+        a[i] = (spread){in[i].variance, square > 0 ? lx_min(1, in[i].variance / square) : 0, value};
     }
-}
-
-static void smooth_variances(const work *w, const lx_estimate *in)
-{
-    spread *a = (spread *)(void *)w->levels[1], *b = (spread *)(void *)w->levels[2];
-    for (uint32_t i = 0; i < w->graph->luxel_count; ++i) {
-        const float value = mean_of(in[i].mean);
-        a[i] = (spread){in[i].variance, in[i].variance > 0 ? lx_min(1, in[i].variance / (value * value)) : 0, value};
+    for (int level = 0; level < pool_levels; ++level) {
+        pool(w->graph, level, NULL, count, NULL, 3, &a->absolute, &b->absolute);
+        spread *swap = a;
+        a = b;
+        b = swap;
     }
-    smooth_spread(w->graph, 0, a, b);
-    smooth_spread(w->graph, 1, b, a);
-    for (uint32_t i = 0; i < w->graph->luxel_count; ++i) {
+    for (uint32_t i = 0; i < count; ++i) {
         // Where the noise is strong a single value says little about the light; the neighbourhood's does.
         const float shared = a[i].relative * a[i].relative / (a[i].relative * a[i].relative + unsure * unsure);
         const float value = (1 - shared) * mean_of(in[i].mean) + shared * a[i].value;
         const float smooth = lx_min(a[i].absolute, contrast * a[i].relative * value * value);
-        w->levels[0][i] = (lx_estimate){in[i].mean, lx_max(smooth, own_share * in[i].variance)}; // an outlier knows that it is one
+        float variance = lx_max(smooth, own_share * in[i].variance); // an outlier knows that it is one
+        if (part == lx_light_direct) variance = lx_min(variance, most_hidden * in[i].variance);
+        // What is below rounding is nothing.
+        w->variances[i] = variance > lx_max(1e-12f * value * value, 1e-30f) ? variance : 0;
     }
 }
 
-static void make_pilots(const work *w)
+// ---- candidates -----------------------------------------------------------------------------------------------------------------
+
+// Weights of the neighbours at a level; returns their sum and the luxel's own.
+static float neighbour_weights(const uint32_t *link, int axis, float *weights)
 {
-    const lx_estimate *in = w->levels[0];
-    const uint32_t *link = links_at(w->graph, 0);
-    for (uint32_t i = 0; i < w->graph->luxel_count; ++i, link += direction_count) {
-        float value = kernel_center * mean_of(in[i].mean), variance = kernel_center * kernel_center * in[i].variance, total = kernel_center;
-        for (int d = 0; d < direction_count; ++d) {
-            const float weight = kernel[d] * (float)(link[d] & lx_denoise_most_weight);
-            const lx_estimate other = in[link[d] >> lx_denoise_weight_bits];
-            value += weight * mean_of(other.mean);
-            variance += weight * weight * other.variance;
-            total += weight;
+    float total = kernel_center;
+    for (int d = 0; d < direction_count / 2; ++d) {
+        const int back = d + direction_count / 2;
+        float a = 0, b = 0;
+        if (axis == every_axis || axis == d) {
+            a = kernel[d] * (float)(link[d] & lx_denoise_most_weight);
+            b = kernel[back] * (float)(link[back] & lx_denoise_most_weight);
+            const float most = lx_min(a, b) + unpaired_share * fabsf(a - b);
+            a = lx_min(a, most);
+            b = lx_min(b, most);
         }
-        w->pilots[i] = (pilot){value / total, variance / (total * total)};
+        weights[d] = a;
+        weights[back] = b;
+        total += a + b;
     }
+    return total;
 }
 
-// How far two values may be taken for one: 1 where their variances explain the difference, towards 0 beyond. [Rousselle2012], for a patch of
-// one: what noise alone explains counts as no difference. Instead of exp(-x): 1 / (1 + x)².
-static float likeness(pilot a, pilot b, float tolerance)
-{
-    const float difference = a.value - b.value, noise = a.variance + b.variance;
-    const float excess = lx_max(0, difference * difference - noise), tolerated = tolerance * tolerance * noise;
-    const float share = tolerated / (tolerated + excess + 1e-30f);
-    return share * share;
-}
-
-// One level of the wavelet: [Schied2017] with the function above; variances go with the squares of the weights.
-static void filter_level(const work *w, int level)
-{
-    const lx_estimate *in = w->levels[level];
-    lx_estimate *out = w->levels[level + 1];
-    const uint32_t *link = links_at(w->graph, level);
-    for (uint32_t i = 0; i < w->graph->luxel_count; ++i, link += direction_count) {
-        const lx_estimate center = in[i];
-        const pilot own = level == 0 ? w->pilots[i] : (pilot){mean_of(center.mean), center.variance};
-        lx_rgb sum = lx_rgb_scale(center.mean, kernel_center);
-        float variance = kernel_center * kernel_center * center.variance, total = kernel_center;
-        for (int d = 0; d < direction_count; ++d) {
-            const uint32_t other_luxel = link[d] >> lx_denoise_weight_bits;
-            const lx_estimate other = in[other_luxel];
-            const pilot others = level == 0 ? w->pilots[other_luxel] : (pilot){mean_of(other.mean), other.variance};
-            const float weight = kernel[d] * (float)(link[d] & lx_denoise_most_weight) * likeness(own, others, w->tolerance);
-            sum = lx_rgb_add(sum, lx_rgb_scale(other.mean, weight));
-            variance += weight * weight * other.variance;
-            total += weight;
-        }
-        const float scale = 1 / total;
-        out[i].mean = lx_rgb_scale(sum, scale);
-        out[i].variance = variance * scale * scale;
-    }
-}
-
-// Stein's estimate of a candidate's squared error, [Li2012]: (F - x)² - v + 2 v dF/dx. The derivative is the weight of the luxel itself in its
-// result; a kernel near a Gaussian gives twice the sum of its squared weights, which the variances tell, and one that is all there is gives 1.
-static void estimate_errors(const work *w)
-{
-    for (uint32_t i = 0; i < w->graph->luxel_count; ++i) {
-        const float variance = w->levels[0][i].variance, value = mean_of(w->levels[0][i].mean);
-        w->errors[i].of[0] = trusted_variance;
-        for (int k = 1; k < candidate_count; ++k) {
-            const float difference = mean_of(w->levels[k][i].mean) - value;
-            const float left = variance > 0 ? w->levels[k][i].variance / variance : 1;
-            const float squared = variance > 0 ? difference * difference / variance : 0;
-            w->errors[i].of[k] = lx_min(most_error, squared) + trusted_variance * (2 * lx_min(1, 1.8f * left) - 1);
-        }
-    }
-}
-
-// Single estimates are noise: only their mean over a neighbourhood tells one candidate from another.
-static void smooth_errors(const lx_denoise_graph *graph, int level, const errors *in, errors *out)
+// One level of the wavelet, [Dammertz2010] without its edges.
+static void filter_level(const lx_denoise_graph *graph, int level, int axis, const lx_rgb *in, lx_rgb *out)
 {
     const uint32_t *link = links_at(graph, level);
     for (uint32_t i = 0; i < graph->luxel_count; ++i, link += direction_count) {
-        errors sum;
-        float total = kernel_center;
-        for (int k = 0; k < candidate_count; ++k) sum.of[k] = kernel_center * in[i].of[k];
+        float weights[direction_count];
+        const float total = neighbour_weights(link, axis, weights);
+        lx_rgb sum = lx_rgb_scale(in[i], kernel_center);
         for (int d = 0; d < direction_count; ++d) {
-            const float weight = kernel[d] * (float)(link[d] & lx_denoise_most_weight);
-            const errors *other = &in[link[d] >> lx_denoise_weight_bits];
-            for (int k = 0; k < candidate_count; ++k) sum.of[k] += weight * other->of[k];
-            total += weight;
+            if (weights[d] == 0) continue;
+            sum = lx_rgb_add(sum, lx_rgb_scale(in[link[d] >> lx_denoise_weight_bits], weights[d]));
         }
-        for (int k = 0; k < candidate_count; ++k) out[i].of[k] = sum.of[k] / total;
+        out[i] = lx_rgb_scale(sum, 1 / total);
     }
 }
 
-// Candidates in inverse proportion to their squared errors: near the best one where it stands out, a mean where they are alike.
-static lx_rgb mix(const work *w, uint32_t luxel, lx_rgb input)
+// Weight that a luxel has itself in each candidate: no way leads back to it, since the steps of each level are longer than those before together.
+static void find_own_weights(const work *w, uint32_t luxel, float *own)
 {
-    const float variance = w->levels[0][luxel].variance;
-    if (!(variance > 0)) return input;
-    lx_rgb sum = {0, 0, 0};
-    float total = 0;
-    for (int k = 0; k < candidate_count; ++k) {
-        const lx_estimate *candidate = &w->levels[k][luxel];
-        // No candidate's error is below the noise that is left in it.
-        const float error = lx_max(w->errors[luxel].of[k], candidate->variance / variance);
-        const float weight = 1 / (error * error + 1e-6f);
-        sum = lx_rgb_add(sum, lx_rgb_scale(candidate->mean, weight));
-        total += weight;
+    static const int axes[] = {every_axis, 0, 2};
+    uint32_t k = 0;
+    for (int a = 0; a < 3 && k < w->candidate_count; ++a) {
+        float product = 1;
+        for (int level = 0; level < (a == 0 ? level_count : narrow_levels); ++level) {
+            float weights[direction_count];
+            product *= kernel_center / neighbour_weights(links_at(w->graph, level) + (size_t)luxel * direction_count, axes[a], weights);
+            own[k++] = product;
+        }
     }
-    const float value = mean_of(input), relative = sqrtf(variance) / lx_max(value, 1e-30f);
-    const float noisy = lx_clamp((relative - clean_error) / (noisy_error - clean_error), 0, 1);
-    return lx_rgb_add(lx_rgb_scale(input, 1 - noisy), lx_rgb_scale(sum, noisy / total));
+}
+
+// Samples that are spread well have less error together than their halves suggest; how much less, only the picture tells. Noise makes neighbours
+// differ: where they differ less than the variances expect, these are lowered. (Where they differ more, that is light.)
+static void calm_variances(const work *w, const lx_rgb *input)
+{
+    typedef struct calm {
+        float share, weight;
+    } calm;
+    const uint32_t count = w->graph->luxel_count;
+    calm *a = (calm *)(void *)w->candidates[1], *b = (calm *)(void *)w->candidates[2];
+    const uint32_t *link = links_at(w->graph, 0);
+    for (uint32_t i = 0; i < count; ++i, link += direction_count) {
+        a[i] = (calm){0, 0};
+        if (!(w->variances[i] > 0)) continue;
+        float weights[direction_count];
+        const float scale = 1 / neighbour_weights(link, every_axis, weights);
+        float expected = (1 - kernel_center * scale) * (1 - kernel_center * scale);
+        for (int d = 0; d < direction_count; ++d) expected += weights[d] * weights[d] * scale * scale;
+        if (!(expected > 0)) continue;
+        const float difference = mean_of(w->candidates[0][i]) - mean_of(input[i]);
+        a[i] = (calm){lx_min(difference * difference / (expected * w->variances[i]), most_difference), 1};
+    }
+    for (int level = 0; level < level_count; ++level) {
+        pool(w->graph, level, NULL, count, NULL, 2, &a->share, &b->share);
+        calm *swap = a;
+        a = b;
+        b = swap;
+    }
+    for (uint32_t i = 0; i < count; ++i)
+        if (a[i].weight > 0) w->variances[i] *= lx_clamp(a[i].share / a[i].weight, least_calm, 1);
+}
+
+// ---- mixtures -------------------------------------------------------------------------------------------------------------------
+
+// Takes into the list what those in it have for neighbours at `level`; false: too many.
+static bool widen(const work *w, int level, uint32_t *count)
+{
+    region *r = w->region;
+    const uint32_t before = *count;
+    for (uint32_t i = 0; i < before; ++i) {
+        const uint32_t *link = links_at(w->graph, level) + (size_t)r->list[i] * direction_count;
+        for (int d = 0; d < direction_count; ++d) {
+            const uint32_t other = link[d] >> lx_denoise_weight_bits;
+            if ((link[d] & lx_denoise_most_weight) == 0 || r->slot[other] != LX_NO_LUXEL) continue;
+            if (*count == region_luxels) return false;
+            r->slot[other] = *count;
+            r->list[(*count)++] = other;
+        }
+    }
+    return true;
+}
+
+static void forget(region *r, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; ++i) r->slot[r->list[i]] = LX_NO_LUXEL;
+}
+
+// Noisy luxels of first … end - 1 and all that their pools reach. Returns how many luxels that are; 0: none is noisy, or too many are reached (`*fits` tells).
+static uint32_t collect(const work *w, uint32_t first, uint32_t end, bool *fits)
+{
+    region *r = w->region;
+    uint32_t count = 0;
+    *fits = true;
+    for (uint32_t i = first; i < end; ++i) {
+        if (!(w->variances[i] > 0)) continue;
+        r->slot[i] = count;
+        r->list[count++] = i;
+    }
+    r->end[0] = count;
+    for (int k = 1; k <= pool_levels && *fits; ++k) {
+        *fits = widen(w, pool_levels - k, &count);
+        r->end[k] = count;
+    }
+    if (*fits) return count;
+    forget(r, count);
+    return 0;
+}
+
+// Products of the candidates' differences from the input, in units of the input's variance, and the weight that they have: none where nothing is noise.
+static void multiply(const work *w, const lx_estimate *in, uint32_t luxel, size_t size, float *out)
+{
+    const float variance = w->variances[luxel];
+    if (!(variance > 0)) {
+        memset(out, 0, size * sizeof *out);
+        return;
+    }
+    const float value = mean_of(in[luxel].mean), scale = 1 / variance;
+    float difference[most_candidates];
+    size_t at = 0;
+    for (uint32_t k = 0; k < w->candidate_count; ++k) {
+        difference[k] = mean_of(w->candidates[k][luxel]) - value;
+        for (uint32_t j = 0; j <= k; ++j) out[at++] = difference[k] * difference[j] * scale;
+    }
+    out[at] = 1;
+}
+
+// Solves A y = b by Cholesky's method, A symmetric, its lower half given; y takes b's place.
+static void solve(float a[most_candidates][most_candidates], uint32_t count, float *y)
+{
+    for (uint32_t i = 0; i < count; ++i)
+        for (uint32_t j = 0; j <= i; ++j) {
+            float sum = a[i][j];
+            for (uint32_t k = 0; k < j; ++k) sum -= a[i][k] * a[j][k];
+            a[i][j] = i == j ? sqrtf(lx_max(sum, 1e-9f)) : sum / a[j][j];
+        }
+    for (uint32_t i = 0; i < count; ++i) {
+        for (uint32_t k = 0; k < i; ++k) y[i] -= a[i][k] * y[k];
+        y[i] /= a[i][i];
+    }
+    for (uint32_t i = count; i-- > 0;) {
+        for (uint32_t k = i + 1; k < count; ++k) y[i] -= a[k][i] * y[k];
+        y[i] /= a[i][i];
+    }
+}
+
+// Weights x of the candidates that have the least of 1 - 2 xᵀ(1 - own) + xᵀ C x: the squared error of input + Σ x (candidate - input) by [Blu2007], in units
+// of the input's variance. Unless they may sharpen: not below zero, the most negative ones left out one by one, and together at most 1.
+static void find_weights(const work *w, const float *products, const float *own, float *x)
+{
+    const uint32_t count = w->candidate_count;
+    const float scale = 1 / products[count * (count + 1) / 2];
+    uint32_t used[most_candidates], used_count = 0;
+    for (uint32_t k = 0; k < count; ++k) {
+        x[k] = 0;
+        if (own[k] < 1) used[used_count++] = k;
+    }
+    while (used_count > 0) {
+        float a[most_candidates][most_candidates], y[most_candidates];
+        for (uint32_t i = 0; i < used_count; ++i) {
+            const uint32_t k = used[i];
+            for (uint32_t j = 0; j <= i; ++j) a[i][j] = products[k * (k + 1) / 2 + used[j]] * scale;
+            a[i][i] = a[i][i] * (1 + ridge) + ridge_of_noise;
+            y[i] = 1 - own[k];
+        }
+        solve(a, used_count, y);
+        uint32_t lowest = 0;
+        float sum = 0;
+        for (uint32_t i = 0; i < used_count; ++i) {
+            sum += y[i];
+            if (y[i] < y[lowest]) lowest = i;
+        }
+        if (!w->may_sharpen && y[lowest] < 0) {
+            --used_count;
+            for (uint32_t i = lowest; i < used_count; ++i) used[i] = used[i + 1];
+            continue;
+        }
+        const float most = w->may_sharpen || sum <= 1 ? 1 : 1 / sum;
+        for (uint32_t i = 0; i < used_count; ++i) x[used[i]] = y[i] * most;
+        return;
+    }
+}
+
+static lx_rgb mix(const work *w, const lx_estimate *in, uint32_t luxel, const float *x)
+{
+    float left = 1;
+    lx_rgb sum = {0, 0, 0};
+    for (uint32_t k = 0; k < w->candidate_count; ++k) {
+        sum = lx_rgb_add(sum, lx_rgb_scale(w->candidates[k][luxel], x[k]));
+        left -= x[k];
+    }
+    sum = lx_rgb_add(sum, lx_rgb_scale(in[luxel].mean, left));
+    lx_rgb low = in[luxel].mean, high = low;
+    const uint32_t *link = links_at(w->graph, 0) + (size_t)luxel * direction_count;
+    for (int d = 0; d < direction_count; ++d) { // the luxel itself where there is no neighbour
+        const lx_rgb other = in[link[d] >> lx_denoise_weight_bits].mean;
+        low = (lx_rgb){lx_min(low.r, other.r), lx_min(low.g, other.g), lx_min(low.b, other.b)};
+        high = (lx_rgb){lx_max(high.r, other.r), lx_max(high.g, other.g), lx_max(high.b, other.b)};
+    }
+    return (lx_rgb){lx_clamp(sum.r, low.r, high.r), lx_clamp(sum.g, low.g, high.g), lx_clamp(sum.b, low.b, high.b)};
+}
+
+static void mix_block(const work *w, const lx_estimate *in, uint32_t first, uint32_t end, lx_rgb *out)
+{
+    region *r = w->region;
+    bool fits;
+    const uint32_t count = collect(w, first, end, &fits);
+    if (!fits) {
+        const uint32_t middle = first + (end - first) / 2;
+        mix_block(w, in, first, middle, out);
+        mix_block(w, in, middle, end, out);
+        return;
+    }
+    if (count == 0) return;
+    const size_t size = (size_t)w->candidate_count * (w->candidate_count + 1) / 2 + 1;
+    float *from = r->products[0], *to = r->products[1];
+    for (uint32_t i = 0; i < count; ++i) multiply(w, in, r->list[i], size, from + size * i);
+    for (int level = 0; level < pool_levels; ++level) {
+        pool(w->graph, level, r->list, r->end[pool_levels - 1 - level], r->slot, size, from, to);
+        float *swap = from;
+        from = to;
+        to = swap;
+    }
+    for (uint32_t i = 0; i < r->end[0]; ++i) {
+        float own[most_candidates], x[most_candidates];
+        find_own_weights(w, r->list[i], own);
+        find_weights(w, from + size * i, own, x);
+        out[r->list[i]] = mix(w, in, r->list[i], x);
+    }
+    forget(r, count);
 }
 
 void lx_denoise_layer(const lx_denoise_graph *graph, lx_light_part part, const lx_estimate *in, void *scratch, lx_rgb *out)
 {
-    work w = lay_out(graph, part, scratch);
     bool is_exact = true;
-    for (uint32_t i = 0; i < graph->luxel_count && is_exact; ++i) is_exact = !(in[i].variance > 0);
-    if (is_exact) {
-        for (uint32_t i = 0; i < graph->luxel_count; ++i) out[i] = in[i].mean;
-        return;
+    for (uint32_t i = 0; i < graph->luxel_count; ++i) {
+        out[i] = in[i].mean;
+        is_exact &= !(in[i].variance > 0);
     }
-    smooth_variances(&w, in);
-    make_pilots(&w);
-    for (int level = 0; level < level_count; ++level) filter_level(&w, level);
-    estimate_errors(&w);
-    smooth_errors(graph, 0, w.errors, w.other_errors);
-    smooth_errors(graph, 1, w.other_errors, w.errors);
-    for (uint32_t i = 0; i < graph->luxel_count; ++i) out[i] = mix(&w, i, in[i].mean);
+    if (is_exact) return;
+    work w = lay_out(graph, part, scratch);
+    pool_variances(&w, part, in);
+    filter_level(graph, 0, every_axis, out, w.candidates[0]);
+    calm_variances(&w, out);
+    for (int level = 1; level < level_count; ++level) filter_level(graph, level, every_axis, w.candidates[level - 1], w.candidates[level]);
+    for (uint32_t k = level_count; k < w.candidate_count; ++k) {
+        const int level = (int)(k - level_count) % narrow_levels, axis = k < level_count + narrow_levels ? 0 : 2;
+        filter_level(graph, level, axis, level == 0 ? out : w.candidates[k - 1], w.candidates[k]);
+    }
+    for (uint32_t first = 0; first < graph->luxel_count; first += block_luxels)
+        mix_block(&w, in, first, graph->luxel_count - first < block_luxels ? graph->luxel_count : first + block_luxels, out);
 }

@@ -1,14 +1,13 @@
-/// Denoising of one layer's irradiance along the surface: a wavelet filter that looks at the estimate's own variance, several widths of it
-/// side by side, and for each luxel the mixture that has the least error by the estimate's own account.
+/// Denoising of one layer's irradiance along the surface: linear filters of several widths side by side, and for each luxel the mixture of
+/// the input and them that has the least squared error around it by Stein's unbiased estimate.
 ///
 /// Three things keep it honest. Light moves along links between neighbouring luxels only, and links never cross a wall, an invalid luxel or a
-/// fold. Differences that the variance does not explain (shadow edges) stop it. And where no width promises less error than the input, the
-/// input stays.
+/// fold. The filters do not look at the light, so that the estimate of their error is exact but for the variance. And the input is
+/// part of every mixture: where differences are larger than the variance explains (shadow edges), or there is no noise, it stays.
 ///
-/// Based on: [Dammertz2010] "Edge-Avoiding À-Trous Wavelet Transform for fast Global Illumination Filtering"; [Schied2017] "Spatiotemporal
-/// Variance-Guided Filtering" (a stopping function on variance that is filtered along); [Rousselle2012] "Adaptive Rendering with Non-Local
-/// Means Filtering" (differences less what noise explains); [Li2012] "SURE-based Optimization for Adaptive Sampling and
-/// Reconstruction" (choice among filters by Stein's unbiased estimate of their error).
+/// Based on: [Blu2007] "The SURE-LET Approach to Image Denoising" (the best mixture as linear equations), here in the neighbourhood of
+/// each luxel; [Li2012] "SURE-based Optimization for Adaptive Sampling and Reconstruction"; [Dammertz2010] "Edge-Avoiding À-Trous Wavelet Transform
+/// for fast Global Illumination Filtering" (the filters, without its edges).
 ///
 /// Use:
 ///     lx_denoise_graph_create(map, can_step, user, pool, &graph, error);            // once, for all layers
@@ -43,7 +42,8 @@ size_t lx_denoise_graph_bytes(uint32_t luxel_count);
 size_t lx_denoise_graph_build_bytes(uint32_t luxel_count);
 size_t lx_denoise_scratch_bytes(const lx_denoise_graph *graph);
 
-/// What light is denoised. Direct light has shadow edges, whose differences count for more; indirect light is smooth and its noise has outliers.
+/// What light is denoised. Direct light has shadow edges: it is also filtered along each axis of the grid alone, and a luxel without noise has none
+/// beside a penumbra. Indirect light is smooth: mixtures may have weights below zero, which keeps its curvature.
 typedef enum lx_light_part { lx_light_direct, lx_light_indirect } lx_light_part;
 
 /// Denoises one layer: `in` [luxel] → `out` [luxel], means alone. `scratch`: lx_denoise_scratch_bytes, 16-byte aligned, content irrelevant before
