@@ -20,7 +20,7 @@ enum {
     pool_levels = 3,                                  // over which products of differences, and variances, are pooled
     most_products = most_candidates * (most_candidates + 1) / 2 + 1, // and a weight
     block_luxels = 1024,  // mixed at a time
-    region_luxels = 4096, // what a block's pools reach; one luxel's reach 729
+    region_luxels = 3072, // what a block's pools reach; one luxel's reach 729
 };
 
 enum { every_axis = -1 }; // else 0 or 2: the direction along it
@@ -295,24 +295,27 @@ static void multiply(const work *w, const lx_estimate *in, uint32_t luxel, size_
 // Solves A y = b by Cholesky's method, A symmetric, its lower half given; y takes b's place.
 static void solve(float a[most_candidates][most_candidates], uint32_t count, float *y)
 {
-    for (uint32_t i = 0; i < count; ++i)
-        for (uint32_t j = 0; j <= i; ++j) {
+    float inverse[most_candidates]; // of the factor's diagonal
+    for (uint32_t i = 0; i < count; ++i) {
+        for (uint32_t j = 0; j < i; ++j) {
             float sum = a[i][j];
             for (uint32_t k = 0; k < j; ++k) sum -= a[i][k] * a[j][k];
-            a[i][j] = i == j ? sqrtf(lx_max(sum, 1e-9f)) : sum / a[j][j];
+            a[i][j] = sum * inverse[j];
         }
-    for (uint32_t i = 0; i < count; ++i) {
+        float square = a[i][i];
+        for (uint32_t k = 0; k < i; ++k) square -= a[i][k] * a[i][k];
+        inverse[i] = 1 / sqrtf(lx_max(square, 1e-9f));
         for (uint32_t k = 0; k < i; ++k) y[i] -= a[i][k] * y[k];
-        y[i] /= a[i][i];
+        y[i] *= inverse[i];
     }
     for (uint32_t i = count; i-- > 0;) {
         for (uint32_t k = i + 1; k < count; ++k) y[i] -= a[k][i] * y[k];
-        y[i] /= a[i][i];
+        y[i] *= inverse[i];
     }
 }
 
 // Weights x of the candidates that have the least of 1 - 2 xᵀ(1 - own) + xᵀ C x: the squared error of input + Σ x (candidate - input) by [Blu2007], in units
-// of the input's variance. Unless they may sharpen: not below zero, the most negative ones left out one by one, and together at most 1.
+// of the input's variance. Unless they may sharpen: not below zero (negative ones are left out and the rest solved again), and together at most 1.
 static void find_weights(const work *w, const float *products, const float *own, float *x)
 {
     const uint32_t count = w->candidate_count;
@@ -331,15 +334,14 @@ static void find_weights(const work *w, const float *products, const float *own,
             y[i] = 1 - own[k];
         }
         solve(a, used_count, y);
-        uint32_t lowest = 0;
+        uint32_t kept = 0;
         float sum = 0;
         for (uint32_t i = 0; i < used_count; ++i) {
             sum += y[i];
-            if (y[i] < y[lowest]) lowest = i;
+            if (w->may_sharpen || y[i] >= 0) used[kept++] = used[i];
         }
-        if (!w->may_sharpen && y[lowest] < 0) {
-            --used_count;
-            for (uint32_t i = lowest; i < used_count; ++i) used[i] = used[i + 1];
+        if (kept < used_count) {
+            used_count = kept;
             continue;
         }
         const float most = w->may_sharpen || sum <= 1 ? 1 : 1 / sum;

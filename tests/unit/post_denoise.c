@@ -97,6 +97,80 @@ static void denoise_shadow_edge_stays(void **state)
     if (!(all < 0.5) || !(edge < 0.9)) fail_msg("%.3f of the noise is left, %.3f at the edge", all, edge);
 }
 
+// What one source's light through a grille looks like: bars of two texels, slanted, and all of it is seen well enough.
+static void denoise_fine_shadows_stay(void **state)
+{
+    (void)state;
+    one_floor();
+    for (uint32_t i = 0; i < map.count; ++i) {
+        const uint32_t x = map.texel[i] % page_edge, y = map.texel[i] / page_edge;
+        truth[i] = lx_rgb_grey((x + y / 3) % 4 < 2 ? 1 : 0.7f);
+    }
+    static const float noises[] = {0.02f, 0.05f, 0.1f};
+    for (int k = 0; k < 3; ++k) {
+        add_noise(noises[k], 23);
+        denoise_part(NULL, lx_light_direct);
+        const double ratio = error_ratio(0, page_edge);
+        if (!(ratio < 1)) fail_msg("noise of %g: error became %.3f of what it was", (double)noises[k], ratio);
+    }
+}
+
+// An edge along the grid is as long as it is sharp: what lies along it is smoothed all the same.
+static void denoise_straight_edge_loses_noise_along_itself(void **state)
+{
+    (void)state;
+    one_floor();
+    for (uint32_t i = 0; i < map.count; ++i) truth[i] = lx_rgb_grey(map.texel[i] / page_edge < 30 ? 2 : 0.5f);
+    add_noise(0.1f, 29);
+    denoise_part(NULL, lx_light_direct);
+    double before = 0, after = 0;
+    for (uint32_t i = 0; i < map.count; ++i) {
+        const uint32_t y = map.texel[i] / page_edge;
+        if (y < 29 || y > 30) continue;
+        before += pow((double)(noisy[i].mean.g - truth[i].g), 2);
+        after += pow((double)(clean[i].g - truth[i].g), 2);
+    }
+    if (!(sqrt(after / before) < 0.75)) fail_msg("%.3f of the noise is left beside the edge", sqrt(after / before));
+}
+
+// Well spread samples have less error together than their halves: variances of three times the error must not make the filter blur.
+static void denoise_overstated_variance_does_not_blur(void **state)
+{
+    (void)state;
+    one_floor();
+    for (uint32_t i = 0; i < map.count; ++i) {
+        const float x = map.position[i].x, z = map.position[i].z;
+        truth[i] = lx_rgb_grey(1 + 0.1f * sinf(0.7f * x) + 0.1f * cosf(0.5f * z + 0.2f * x)); // waves of nine texels and more
+    }
+    static const float noises[] = {0.01f, 0.02f, 0.05f};
+    for (int k = 0; k < 3; ++k) {
+        add_noise(noises[k], 31);
+        for (uint32_t i = 0; i < map.count; ++i) noisy[i].variance *= 3;
+        denoise_with(NULL);
+        const double ratio = error_ratio(0, page_edge);
+        if (!(ratio < 0.9)) fail_msg("noise of %g: error became %.3f of what it was", (double)noises[k], ratio);
+    }
+}
+
+static void denoise_no_value_is_invented(void **state)
+{
+    (void)state;
+    one_floor();
+    for (uint32_t i = 0; i < map.count; ++i) truth[i] = lx_rgb_grey(random_of(37, i / 16) < 0.1f ? 50 : 0); // on black
+    add_noise(0.5f, 37);
+    float most = 0;
+    for (uint32_t i = 0; i < map.count; ++i) {
+        noisy[i].mean.g = lx_max(noisy[i].mean.g, 0);
+        noisy[i].variance += 0.01f;
+        most = lx_max(most, noisy[i].mean.g);
+    }
+    for (int part = 0; part < 2; ++part) {
+        denoise_part(NULL, part ? lx_light_indirect : lx_light_direct);
+        for (uint32_t i = 0; i < map.count; ++i)
+            if (!(clean[i].g >= 0 && clean[i].g <= most)) fail_msg("texel %u became %g", map.texel[i], (double)clean[i].g);
+    }
+}
+
 static void denoise_bright_spot_does_not_run(void **state)
 {
     (void)state;
@@ -212,11 +286,44 @@ static void denoise_any_number_of_threads_gives_the_same_bits(void **state)
     assert_memory_equal(first, clean, map.count * sizeof *clean);
 }
 
+static void swap_luxels(uint32_t a, uint32_t b)
+{
+#define SWAP(array) do { const __typeof__(array[0]) kept = array[a]; array[a] = array[b]; array[b] = kept; } while (0)
+    SWAP(luxel_texel);
+    SWAP(luxel_position);
+    SWAP(noisy);
+#undef SWAP
+    luxel_index[luxel_texel[a]] = a;
+    luxel_index[luxel_texel[b]] = b;
+}
+
+// Luxels that lie far from each other in memory: pools of a block reach more of them than are mixed at a time.
+static void denoise_order_of_luxels_does_not_matter(void **state)
+{
+    (void)state;
+    static lx_rgb by_texel[page_texels];
+    map_clear();
+    map_add(0, 0, 0, page_edge, page_edge, lx_v3(0, 0, 0), lx_v3(1, 0, 0), lx_v3(0, 0, 1));
+    for (uint32_t i = 0; i < map.count; ++i) truth[i] = lx_rgb_grey(1 + random_of(41, i / 64));
+    add_noise(0.2f, 41);
+    for (int part = 0; part < 2; ++part) {
+        denoise_part(NULL, part ? lx_light_indirect : lx_light_direct);
+        for (uint32_t i = 0; i < map.count; ++i) by_texel[map.texel[i]] = clean[i];
+        for (uint32_t i = map.count; i-- > 1;) swap_luxels(i, (uint32_t)(random_of(43, i) * (float)i));
+        denoise_part(NULL, part ? lx_light_indirect : lx_light_direct);
+        for (uint32_t i = 0; i < map.count; ++i) assert_memory_equal(&by_texel[map.texel[i]], &clean[i], sizeof *clean);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(denoise_smooth_light_loses_most_of_its_noise),
         cmocka_unit_test(denoise_shadow_edge_stays),
+        cmocka_unit_test(denoise_fine_shadows_stay),
+        cmocka_unit_test(denoise_straight_edge_loses_noise_along_itself),
+        cmocka_unit_test(denoise_overstated_variance_does_not_blur),
+        cmocka_unit_test(denoise_no_value_is_invented),
         cmocka_unit_test(denoise_bright_spot_does_not_run),
         cmocka_unit_test(denoise_exact_light_stays_bit_by_bit),
         cmocka_unit_test(denoise_nearly_clean_light_stays),
@@ -224,6 +331,7 @@ int main(void)
         cmocka_unit_test(denoise_invalid_luxels_give_nothing_and_part_what_they_part),
         cmocka_unit_test(denoise_goes_on_across_a_seam_and_not_across_a_right_angle),
         cmocka_unit_test(denoise_any_number_of_threads_gives_the_same_bits),
+        cmocka_unit_test(denoise_order_of_luxels_does_not_matter),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }
