@@ -22,6 +22,13 @@ typedef struct lx_bake_job {
 lx_result lx_bake_by_paths(lx_bake_job *job, lx_error *error);
 lx_result lx_bake_by_gathering(lx_bake_job *job, lx_error *error);
 
+/// Do gather rays from a luxel meet the source's light, and is that a part of its direct light?
+static inline bool lx_bake_meets(const lx_bake *bake, uint32_t source)
+{
+    const lx_source_kind kind = lx_tracer_source(bake->tracer, source)->kind;
+    return bake->uses[source].direct && !bake->desc.indirect_only && (kind == LX_SOURCE_EMISSIVE || kind == LX_SOURCE_SKY);
+}
+
 /// The luxel's place among the pages.
 static inline const lx_luxel_page *lx_job_page(const lx_bake_job *job, uint32_t luxel, uint32_t *texel)
 {

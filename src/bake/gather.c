@@ -44,6 +44,7 @@ typedef struct gather_scratch {
     lx_receiver *sites;     // [tile_luxels][lx_site_count]
     lx_gather_start *starts; // [chunk_luxels × rays of a round at most]
     float *sums;            // [2][chunk_luxels][3][row_layers], or [tile_luxels][3][row_layers]
+    float *met;             // [2][chunk_luxels][3][row_layers] what gather rays meet of light sources; NULL: nothing is met
     lx_rgb *mean;           // [cells][tile_luxels] of one source
     float *variance;
     uint32_t *found;        // [tile_luxels][most_pass_rays]
@@ -82,6 +83,8 @@ typedef struct gather_job {
     uint32_t *hits;         // [luxel][pass_rays]
     lx_gather_extras *extras; // [tile]; targets are luxels of the tile
     lx_estimate *direct, *indirect; // [layer][luxel]
+    lx_estimate *met_estimates; // [those layers that gather rays may meet][luxel]: a part of direct light, taken into it after the last round
+    lx_estimate **met;      // [layer] where among them; NULL: never met
     double *pass_change, *pass_energy; // [tile][layer]
     uint8_t *converged;     // [layer] needs no more passes
     tile_state *tiles;
@@ -398,29 +401,36 @@ static size_t make_starts(const gather_job *g, gather_scratch *s, uint32_t first
     return count;
 }
 
+// Takes the round's sums of one layer into the estimate of one luxel. Returns how far the halves' means are apart.
+static float take_round(const gather_job *g, const float *a, const float *b, uint32_t l, lx_estimate *e)
+{
+    const uint32_t n = g->round_count, half = (n + 1) / 2;
+    const float unit = LX_ROW_UNIT / g->scales[l];
+    float mean[3], difference = 0;
+    for (size_t c = 0; c < 3; ++c) {
+        const float x = a[c * g->row_layers + l] * unit, y = b[c * g->row_layers + l] * unit;
+        mean[c] = (x + y) / (float)n;
+        if (n > half) difference += (x / (float)half - y / (float)(n - half)) / 3;
+    }
+    const float before = (float)g->round_first, after = before + (float)n;
+    const float variance = difference * difference / 4;
+    e->mean.r = (e->mean.r * before + mean[0] * (float)n) / after;
+    e->mean.g = (e->mean.g * before + mean[1] * (float)n) / after;
+    e->mean.b = (e->mean.b * before + mean[2] * (float)n) / after;
+    e->variance = (e->variance * before * before + variance * (float)n * (float)n) / (after * after);
+    return difference;
+}
+
 // Takes the round's sums into the estimates of one luxel.
 static void fold(const gather_job *g, const tile_state *state, const gather_scratch *s, uint32_t index, uint32_t row)
 {
-    const uint32_t n = g->round_count, half = (n + 1) / 2;
-    const float *a = s->sums + g->stride * row, *b = s->sums + g->stride * ((size_t)chunk_luxels + row);
+    const size_t first = g->stride * row, second = g->stride * ((size_t)chunk_luxels + row);
     const size_t luxel = s->luxel[index];
     sum_estimate *sum = &g->sums[luxel];
     for (uint32_t l = 0; l < g->layer_count; ++l) {
         if (state->frozen[l]) continue;
-        const float unit = LX_ROW_UNIT / g->scales[l];
-        float mean[3], difference = 0;
-        for (size_t c = 0; c < 3; ++c) {
-            const float x = a[c * g->row_layers + l] * unit, y = b[c * g->row_layers + l] * unit;
-            mean[c] = (x + y) / (float)n;
-            if (n > half) difference += (x / (float)half - y / (float)(n - half)) / 3;
-        }
-        const float before = (float)g->round_first, after = before + (float)n;
-        const float variance = difference * difference / 4;
-        lx_estimate *e = &g->indirect[(size_t)l * g->luxel_count + luxel];
-        e->mean.r = (e->mean.r * before + mean[0] * (float)n) / after;
-        e->mean.g = (e->mean.g * before + mean[1] * (float)n) / after;
-        e->mean.b = (e->mean.b * before + mean[2] * (float)n) / after;
-        e->variance = (e->variance * before * before + variance * (float)n * (float)n) / (after * after);
+        const float difference = take_round(g, s->sums + first, s->sums + second, l, &g->indirect[(size_t)l * g->luxel_count + luxel]);
+        if (g->met[l]) take_round(g, s->met + first, s->met + second, l, &g->met[l][luxel]);
         if (g->round_first > 0) continue;
         sum->difference += difference * g->authored[l];
         sum->squares += difference * difference * g->authored[l] * g->authored[l];
@@ -440,7 +450,12 @@ static double tile_error(const gather_job *g, const gather_scratch *s, uint32_t 
     const float least = darkest * g->layer_means[layer];
     for (uint32_t i = 0; i < s->count; ++i) {
         const lx_estimate *d = &direct[s->luxel[i]], *e = &indirect[s->luxel[i]];
-        const float value = lx_max(grey(d->mean) + grey(e->mean), least), variance = d->variance + e->variance;
+        float value = grey(d->mean) + grey(e->mean), variance = d->variance + e->variance;
+        if (g->met[layer]) {
+            value += grey(g->met[layer][s->luxel[i]].mean);
+            variance += g->met[layer][s->luxel[i]].variance;
+        }
+        value = lx_max(value, least);
         if (variance > 0) sum += (double)variance / ((double)value * (double)value);
     }
     return s->count > 0 ? sqrt(sum / s->count) : 0;
@@ -460,7 +475,8 @@ static lx_result gather_tile(void *user, size_t task, uint32_t worker, lx_error 
         const uint32_t end = first + chunk < s->count ? first + chunk : s->count;
         memset(s->sums, 0, 2 * chunk_luxels * g->stride * sizeof *s->sums);
         const size_t count = make_starts(g, s, first, end);
-        const lx_gather_output out = {.sums = s->sums};
+        if (s->met) memset(s->met, 0, 2 * chunk_luxels * g->stride * sizeof *s->met);
+        const lx_gather_output out = {.sums = s->sums, .met = s->met};
         const lx_result result = lx_gather_trace(s->batch, &g->settings, s->starts, count, &out, error);
         if (result != LX_OK) return result;
         for (uint32_t i = first; i < end; ++i) fold(g, state, s, i, i - first);
@@ -496,7 +512,7 @@ static void find_layer_means(gather_job *g)
         for (uint32_t i = 0; i < map->count; ++i) {
             if (!map->valid[i]) continue;
             const size_t at = (size_t)l * g->luxel_count + i;
-            sum += (double)(grey(g->direct[at].mean) + grey(g->indirect[at].mean));
+            sum += (double)(grey(g->direct[at].mean) + grey(g->indirect[at].mean) + (g->met[l] ? grey(g->met[l][i].mean) : 0));
             ++count;
         }
         g->layer_means[l] = count > 0 ? (float)(sum / count) : 0;
@@ -567,10 +583,11 @@ static lx_result create_scratch(gather_job *g, uint32_t workers, uint32_t round_
         s->sites = lx_calloc_array((size_t)tile_luxels * lx_site_count, sizeof *s->sites);
         s->starts = lx_malloc_array(chunk_luxels * rays, sizeof *s->starts);
         s->sums = lx_malloc_array(sum_rows, g->stride * sizeof *s->sums);
+        if (g->met_estimates) s->met = lx_malloc_array(2 * (size_t)chunk_luxels, g->stride * sizeof *s->met);
         s->mean = lx_malloc_array(cells * tile_luxels, sizeof *s->mean);
         s->variance = lx_malloc_array(cells * tile_luxels, sizeof *s->variance);
         s->found = lx_malloc_array((size_t)chunk_luxels * most_pass_rays, sizeof *s->found);
-        if (!s->batch || !s->direct || !s->sites || !s->starts || !s->sums || !s->mean || !s->variance || !s->found)
+        if (!s->batch || !s->direct || !s->sites || !s->starts || !s->sums || (g->met_estimates && !s->met) || !s->mean || !s->variance || !s->found)
             return lx_fail_memory(error, "workers");
     }
     return LX_OK;
@@ -585,12 +602,12 @@ static void release_cache(gather_job *g, uint32_t workers)
         if (s->direct) g->job->ray_count += lx_direct_batch_rays(s->direct);
         lx_gather_batch_destroy(s->batch);
         lx_direct_batch_destroy(s->direct);
-        void *arrays[] = {s->sites, s->starts, s->sums, s->mean, s->variance, s->found};
+        void *arrays[] = {s->sites, s->starts, s->sums, s->met, s->mean, s->variance, s->found};
         for (size_t k = 0; k < sizeof arrays / sizeof *arrays; ++k) lx_free(arrays[k]);
     }
     for (uint32_t t = 0; g->extras && t < g->job->map.tile_count; ++t) lx_free(g->extras[t].items);
     void **arrays[] = {(void **)&g->scratch, (void **)&g->extras, (void **)&g->albedo, (void **)&g->radiosity, (void **)&g->rows[0], (void **)&g->rows[1],
-                       (void **)&g->hits};
+                       (void **)&g->hits, (void **)&g->met_estimates};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) {
         lx_free(*arrays[i]);
         *arrays[i] = NULL;
@@ -603,8 +620,29 @@ static void release(gather_job *g)
     for (uint32_t t = 0; g->tiles && t < g->job->map.tile_count; ++t) {
         lx_free(g->tiles[t].frozen);
     }
-    void *arrays[] = {g->scales, g->authored, g->direct, g->indirect, g->pass_change, g->pass_energy, g->converged, g->tiles, g->layer_means};
+    void *arrays[] = {g->met, g->scales, g->authored, g->direct, g->indirect, g->pass_change, g->pass_energy, g->converged, g->tiles, g->layer_means};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) lx_free(arrays[i]);
+}
+
+// Light sources that gather rays meet: those whose part of the layers' direct light is in two estimates until the last round.
+static lx_result allocate_met(gather_job *g, lx_error *error)
+{
+    uint32_t count = 0;
+    g->met = lx_calloc_array(g->layer_count, sizeof *g->met);
+    bool *is_met = lx_calloc_array(g->layer_count, sizeof *is_met);
+    for (uint32_t s = 0; g->met && is_met && s < g->bake->source_count; ++s) {
+        const lx_source_use *use = &g->uses[s];
+        if (use->layer < 0 || !lx_bake_meets(g->bake, s)) continue;
+        const uint32_t cells = use->cells ? 1 : lx_tracer_cell_count(g->bake->tracer, s);
+        for (uint32_t cell = 0; cell < cells; ++cell) is_met[(uint32_t)use->layer + cell] = true;
+    }
+    for (uint32_t l = 0; is_met && l < g->layer_count; ++l) count += is_met[l];
+    if (count > 0) g->met_estimates = lx_calloc_array(count, g->luxel_count * sizeof *g->met_estimates);
+    const bool ok = g->met && is_met && (count == 0 || g->met_estimates);
+    for (uint32_t l = 0, k = 0; ok && l < g->layer_count; ++l)
+        if (is_met[l]) g->met[l] = g->met_estimates + (size_t)k++ * g->luxel_count;
+    lx_free(is_met);
+    return ok ? LX_OK : lx_fail_memory(error, "layers; --memory bakes them in groups");
 }
 
 static lx_result allocate(gather_job *g, lx_error *error)
@@ -635,6 +673,16 @@ static lx_result allocate(gather_job *g, lx_error *error)
         if (!g->tiles[t].frozen) return lx_fail_memory(error, "layers");
     }
     return LX_OK;
+}
+
+static void take_met_light(const gather_job *g)
+{
+    for (uint32_t l = 0; l < g->layer_count; ++l)
+        for (uint32_t i = 0; g->met[l] && i < g->luxel_count; ++i) {
+            lx_estimate *direct = &g->direct[(size_t)l * g->luxel_count + i];
+            direct->mean = lx_rgb_add(direct->mean, g->met[l][i].mean);
+            direct->variance += g->met[l][i].variance;
+        }
 }
 
 // Takes a group's layers into the sum.
@@ -720,6 +768,7 @@ static lx_result bake_group(lx_bake_job *job, uint32_t first, uint32_t count, lx
     g.stride = 3 * (size_t)g.row_layers;
     g.settings.bounces = bounces;
     LX_TRY(allocate(&g, error));
+    LX_TRY(allocate_met(&g, error));
     find_authored(&g);
     choose_scales(&g);
     LX_TRY(lx_lookup_create(bake, &job->map.view, &g.lookup, error));
@@ -739,6 +788,7 @@ static lx_result bake_group(lx_bake_job *job, uint32_t first, uint32_t count, lx
     }
     LX_TRY(run_rounds(&g, deadline, error));
     job->stages.gather += lx_lap(&stage_start);
+    take_met_light(&g);
     add_to_sums(&g);
     release_cache(&g, workers);
     lx_trim_memory();

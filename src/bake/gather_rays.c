@@ -82,13 +82,14 @@ static uint32_t dimension_key(uint32_t stream, uint32_t vertex, uint32_t dimensi
 
 // ---- what arrives ---------------------------------------------------------------------------------------------------------------
 
-static void add_light(const lx_gather_settings *settings, const lx_gather_output *out, uint32_t target, const lx_source_use *use, uint32_t cell,
-                      lx_rgb value)
+// `vertex`: where the ray that found the light came from.
+static void add_light(const lx_gather_settings *settings, const lx_gather_output *out, uint32_t vertex, uint32_t target, const lx_source_use *use,
+                      uint32_t cell, lx_rgb value)
 {
     const size_t layer = (size_t)use->layer + (use->cells ? 0 : cell), layers = settings->row_layers;
     if (use->cells) value = lx_rgb_mul(value, use->cells[cell]);
     const float unit = settings->scales[layer] * (1 / LX_ROW_UNIT);
-    float *sum = out->sums + 3 * layers * target + layer;
+    float *sum = (vertex == 0 && out->met ? out->met : out->sums) + 3 * layers * target + layer;
     sum[0] += value.r * use->weight.r * unit;
     sum[layers] += value.g * use->weight.g * unit;
     sum[2 * layers] += value.b * use->weight.b * unit;
@@ -109,7 +110,7 @@ static void add_sky(const lx_gather_settings *settings, const lx_gather_output *
     const lx_source_use *use = &settings->uses[tracer->source_count - 1]; // the sky comes last
     if (!counts(settings, use, vertex)) return;
     const float weight = lx_sky_weight(tracer, direction, cosine);
-    add_light(settings, out, target, use, 0, lx_rgb_scale(lx_rgb_mul(throughput, lx_sky_radiance(&tracer->sky, direction)), LX_PI * weight));
+    add_light(settings, out, vertex, target, use, 0, lx_rgb_scale(lx_rgb_mul(throughput, lx_sky_radiance(&tracer->sky, direction)), LX_PI * weight));
 }
 
 static void add_emission(const lx_gather_settings *settings, const lx_gather_output *out, const flight *f, const lx_ray *ray, const lx_hit *hit,
@@ -123,7 +124,7 @@ static void add_emission(const lx_gather_settings *settings, const lx_gather_out
     const uint32_t samples = f->vertex == 0 ? lx_direct_sample_weight(tracer, (uint32_t)source) : 1;
     const float weight = lx_hit_weight(tracer, ray, hit, s->geometric_normal, f->cosine, samples);
     const uint32_t cell = lx_tracer_cell_at(tracer, hit->surface, hit->triangle, hit->u, hit->v);
-    add_light(settings, out, f->target, use, cell, lx_rgb_scale(lx_rgb_mul(f->throughput, s->emission), LX_PI * weight));
+    add_light(settings, out, f->vertex, f->target, use, cell, lx_rgb_scale(lx_rgb_mul(f->throughput, s->emission), LX_PI * weight));
 }
 
 // ---- directions -------------------------------------------------------------------------------------------------------------------
@@ -371,7 +372,7 @@ static void flush_shadow_rays(lx_gather_batch *b, const lx_gather_settings *sett
     for (size_t k = 0; k < count; ++k) {
         const vertex_record *v = &b->vertices[b->owner[k]];
         const lx_rgb arrives = lx_rgb_mul(b->light[k], b->transmittance[k]);
-        if (!lx_rgb_is_black(arrives)) add_light(settings, out, v->target, use, b->cell[k], lx_rgb_mul(v->throughput, arrives));
+        if (!lx_rgb_is_black(arrives)) add_light(settings, out, v->number, v->target, use, b->cell[k], lx_rgb_mul(v->throughput, arrives));
     }
 }
 

@@ -14,6 +14,7 @@ static const struct {
     uint32_t extra;           // and what paths that went on found, on average
     uint32_t sum;             // estimate of the sum of all layers
     uint32_t estimate;        // and layer: direct and indirect light
+    uint32_t met;             // and layer whose light gather rays meet: a part of its direct light
     uint32_t row;             // and layer, layers padded: radiosity, and what two passes add to it
     // Per texel of the pages:
     uint32_t place;
@@ -22,6 +23,7 @@ static const struct {
     // Per worker:
     uint32_t batches;
     uint32_t worker_row; // and layer, padded: sums of a tile
+    uint32_t worker_met; // and what is met of them, of a half
     uint32_t worker_cell; // and cell of the largest monitor: light of a tile
 } cost = {
     .albedo = sizeof(lx_rgb),
@@ -29,11 +31,13 @@ static const struct {
     .extra = 40,
     .sum = 5 * sizeof(float),
     .estimate = 2 * sizeof(lx_estimate),
+    .met = sizeof(lx_estimate),
     .row = 3 * sizeof(float) + 2 * 3 * sizeof(uint16_t),
     .place = 2 * sizeof(uint32_t),
     .tile = 2 * sizeof(double) + 1,
     .batches = 4 << 20,
     .worker_row = lx_luxel_tile_edge * lx_luxel_tile_edge * 3 * sizeof(float),
+    .worker_met = lx_luxel_tile_edge * lx_luxel_tile_edge / 2 * 3 * sizeof(float),
     .worker_cell = lx_luxel_tile_edge * lx_luxel_tile_edge * (sizeof(lx_rgb) + sizeof(float)),
 };
 
@@ -61,6 +65,17 @@ static uint32_t largest_cell_count(const lx_bake *bake)
     return largest;
 }
 
+// Layers of the bake whose light gather rays meet, at most.
+static uint32_t met_layer_count(const lx_bake *bake)
+{
+    uint32_t count = 0;
+    for (uint32_t s = 0; s < bake->source_count; ++s) {
+        if (bake->uses[s].layer < 0 || !lx_bake_meets(bake, s)) continue;
+        count += bake->uses[s].cells ? 1 : lx_tracer_cell_count(bake->tracer, s);
+    }
+    return count < bake->layer_count ? count : bake->layer_count;
+}
+
 // What baking a group of `layers` adds to what is there.
 static uint64_t group_bytes(const lx_bake_job *job, const lx_finish *finish, uint32_t layers)
 {
@@ -69,7 +84,9 @@ static uint64_t group_bytes(const lx_bake_job *job, const lx_finish *finish, uin
     const uint32_t workers = lx_pool_worker_count(bake->scene->context->pool);
     const bool bounces = !bake->desc.direct_only && bake->desc.transport.bounces > 0;
     const uint64_t estimates = luxels * (cost.sum + (uint64_t)cost.estimate * layers) + (uint64_t)job->map.tile_count * cost.tile * layers;
-    uint64_t cache = lookup_bytes(bake) + workers * (cost.batches + cost.worker_row * padded + (uint64_t)cost.worker_cell * largest_cell_count(bake));
+    const uint64_t met = met_layer_count(bake) < layers ? met_layer_count(bake) : layers, worker_row = cost.worker_row + (met > 0 ? cost.worker_met : 0);
+    uint64_t cache = lookup_bytes(bake) + workers * (cost.batches + worker_row * padded + (uint64_t)cost.worker_cell * largest_cell_count(bake));
+    cache += luxels * cost.met * met;
     if (bounces) cache += luxels * (cost.albedo + cost.pass_ray * most_pass_rays + cost.extra + cost.row * padded);
     const uint64_t finishing = lx_finish_worker_bytes(finish) * (layers < workers ? layers : workers); // the cache is gone by then
     return estimates + (cache > finishing ? cache : finishing);
