@@ -11,7 +11,6 @@
 enum {
     batch_size = lx_gather_batch_size,
     look_ahead = 8,        // rows that are fetched before they are added
-    roulette_from = 3,     // bounces
     near_until = 4,        // vertices; paths caught in a corner are looked up all the same
     most_passes = 256,     // surfaces one ray may pass through
 };
@@ -39,6 +38,12 @@ typedef struct pending {
     uint32_t index; // of the ray in the batch
 } pending;
 
+typedef struct slow_row {
+    const uint16_t *row;
+    uint32_t target;
+    lx_rgb weight;
+} slow_row;
+
 struct lx_gather_batch {
     lx_ray rays[batch_size];
     lx_hit hits[batch_size];
@@ -53,6 +58,8 @@ struct lx_gather_batch {
     flight flights[2 * batch_size];
     lx_shading shading[2 * batch_size];
     size_t slow_count;
+    slow_row slow_rows[2 * batch_size];
+    size_t slow_row_count;
     vertex_record vertices[2 * batch_size];
     lx_ray shadow_rays[batch_size];
     lx_rgb light[batch_size], transmittance[batch_size];
@@ -224,14 +231,16 @@ static size_t make_rays(lx_gather_batch *b, const lx_gather_start *starts, size_
     return made;
 }
 
+static void fetch_row(const uint16_t *row, size_t stride)
+{
+    for (size_t k = 0; k < stride; k += 32) __builtin_prefetch(row + k);
+}
+
 static void add_rows(lx_gather_batch *b, const lx_gather_settings *settings, const lx_gather_output *out, size_t count)
 {
     const size_t stride = 3 * (size_t)settings->row_layers;
     for (size_t i = 0; i < count; ++i) {
-        if (i + look_ahead < count) {
-            const uint16_t *next = settings->rows + stride * b->found[i + look_ahead];
-            for (size_t k = 0; k < stride; k += 32) __builtin_prefetch(next + k);
-        }
+        if (i + look_ahead < count) fetch_row(settings->rows + stride * b->found[i + look_ahead], stride);
         lx_row_add(out->sums + stride * b->found_target[i], settings->rows + stride * b->found[i], stride);
     }
 }
@@ -301,13 +310,11 @@ static bool passes_on(flight *f, const lx_shading *s)
 
 static bool make_vertex(const flight *f, const lx_shading *s, vertex_record *out)
 {
+    // The path is but one of a luxel's many rays: it goes on as often as what it would bring counts, beside rays that are looked up at once.
     lx_rgb throughput = lx_rgb_mul(f->throughput, s->albedo);
-    if (f->vertex + 1 >= roulette_from) {
-        const float survival = lx_min(1, lx_rgb_max(throughput));
-        if (!(lx_sobol_one(f->sample, dimension_key(f->stream, f->vertex, dimension_roulette)) < survival)) return false;
-        throughput = lx_rgb_scale(throughput, 1 / survival);
-    }
-    if (!(lx_rgb_max(throughput) > 0)) return false;
+    const float survival = lx_min(1, lx_rgb_max(throughput));
+    if (!(lx_sobol_one(f->sample, dimension_key(f->stream, f->vertex, dimension_roulette)) < survival)) return false;
+    throughput = lx_rgb_scale(throughput, 1 / survival);
     const float side = s->front ? 1.0f : -1.0f;
     *out = (vertex_record){.receiver = {s->position, lx_scale(s->normal, side), lx_scale(s->geometric_normal, side)}, .throughput = throughput,
                            .stream = f->stream, .sample = f->sample, .target = f->target, .number = f->vertex + 1};
@@ -315,17 +322,18 @@ static bool make_vertex(const flight *f, const lx_shading *s, vertex_record *out
 }
 
 // The luxel that answers for a hit of the second loop; LX_NO_LUXEL: the path goes on.
-static uint32_t slow_lookup(const lx_gather_settings *settings, const flight *f, const lx_hit *hit, const lx_shading *s)
+static uint32_t slow_lookup(const lx_gather_settings *settings, const flight *f, const lx_hit *hit)
 {
     const lx_lookup_surface *surface = &settings->lookup->surfaces[hit->surface];
-    if (!s->front || !surface->triangles || surface->triangles[hit->triangle].chart == LX_NO_CHART) return LX_NO_LUXEL;
+    if (hit->back || !surface->triangles || surface->triangles[hit->triangle].chart == LX_NO_CHART) return LX_NO_LUXEL;
     if (hit->t < settings->near_texels * surface->texel_m && f->vertex < near_until) return LX_NO_LUXEL;
     return lx_lookup_luxel(settings->lookup, lx_lookup_taps(settings->lookup, hit, tap_bits(f->stream, f->vertex, f->sample)));
 }
 
-static lx_result add_slow_row(const lx_gather_settings *settings, const flight *f, uint32_t luxel, const lx_gather_output *out, lx_error *error)
+// Takes note of a look-up; add_slow_rows adds what was noted, fetching ahead.
+static lx_result find_slow_row(lx_gather_batch *b, const lx_gather_settings *settings, const flight *f, uint32_t luxel, const lx_gather_output *out,
+                               lx_error *error)
 {
-    const size_t stride = 3 * (size_t)settings->row_layers;
     if (out->luxels) {
         lx_gather_extras *extras = out->extras;
         if (!lx_array_reserve(&extras->items, &extras->capacity, extras->count + 1, sizeof *extras->items))
@@ -334,16 +342,27 @@ static lx_result add_slow_row(const lx_gather_settings *settings, const flight *
         return LX_OK;
     }
     const uint16_t *rows = f->vertex == 0 ? settings->rows : settings->rows_later;
-    if (!rows) return LX_OK;
-    const float factor[3] = {f->throughput.r, f->throughput.g, f->throughput.b};
-    lx_row_add_scaled(out->sums + stride * f->target, rows + stride * luxel, settings->row_layers, factor);
+    if (rows) b->slow_rows[b->slow_row_count++] = (slow_row){rows + 3 * (size_t)settings->row_layers * luxel, f->target, f->throughput};
     return LX_OK;
+}
+
+static void add_slow_rows(lx_gather_batch *b, const lx_gather_settings *settings, const lx_gather_output *out)
+{
+    const size_t stride = 3 * (size_t)settings->row_layers;
+    for (size_t i = 0; i < b->slow_row_count; ++i) {
+        if (i + look_ahead < b->slow_row_count) fetch_row(b->slow_rows[i + look_ahead].row, stride);
+        const slow_row *r = &b->slow_rows[i];
+        const float factor[3] = {r->weight.r, r->weight.g, r->weight.b};
+        lx_row_add_scaled(out->sums + stride * r->target, r->row, settings->row_layers, factor);
+    }
+    b->slow_row_count = 0;
 }
 
 // The light of a vertex is but one of a luxel's many rays: roulette skips more of it than the path integrator does.
 static bool sample_light(const lx_gather_settings *settings, uint32_t source, const vertex_record *v, lx_ray *ray, lx_rgb *light, uint32_t *cell)
 {
-    enum { scale_factor = 200 }; // source_scales are a twentieth of the mean
+    // source_scales are a twentieth of the mean. Bounds are met by few samples: most bring less than an eighth.
+    enum { scale_factor = 1000, bound_excess = 8 };
     const lx_tracer *tracer = settings->tracer;
     const uint32_t key = lx_hash_combine(tracer->source_keys[source], gather_key + v->number);
     const float scale = scale_factor * tracer->source_scales[source];
@@ -353,7 +372,7 @@ static bool sample_light(const lx_gather_settings *settings, uint32_t source, co
     const lx_source_sphere *sphere = &tracer->source_spheres[source];
     if (!(bound < INFINITY) && sphere->power < INFINITY && sphere->radius > 0) bound = 4 * sphere->power / (sphere->radius * sphere->radius);
     const float brightness = lx_rgb_max(v->throughput);
-    const float chance = lx_light_roulette(v->stream, v->sample, key ^ 0x68bc21ebu, brightness * bound, scale);
+    const float chance = lx_light_roulette(v->stream, v->sample, key ^ 0x68bc21ebu, brightness * bound / bound_excess, scale);
     if (chance == 0) return false;
     const lx_vec2 u = lx_sobol_pair(v->sample, lx_hash_combine(v->stream, key));
     if (!lx_sample_source(tracer, source, &v->receiver, u, 1, ray, light, cell)) return false;
@@ -392,41 +411,71 @@ static void next_events(lx_gather_batch *b, const lx_gather_settings *settings, 
     }
 }
 
+// What needs no shading: rays that left the scene, hits that are black or looked up. Others stay, in order; *count is how many.
+static lx_result finish_simple(lx_gather_batch *b, const lx_gather_settings *settings, size_t *count, const lx_gather_output *out, lx_error *error)
+{
+    lx_result result = LX_OK;
+    size_t kept = 0;
+    for (size_t i = 0; i < *count && result == LX_OK; ++i) {
+        const flight *f = &b->flights[i];
+        const lx_hit *hit = &b->slow_hits[i];
+        if (hit->surface == LX_MISS) {
+            add_sky(settings, out, f->throughput, f->cosine, f->target, b->slow_rays[i].direction, f->vertex);
+            continue;
+        }
+        const lx_lookup_surface *surface = &settings->lookup->surfaces[hit->surface];
+        if (surface->plain) {
+            if ((hit->back && !surface->double_sided) || f->vertex >= settings->bounces) continue; // black
+            const uint32_t luxel = slow_lookup(settings, f, hit);
+            if (luxel != LX_NO_LUXEL) {
+                result = find_slow_row(b, settings, f, luxel, out, error);
+                continue;
+            }
+        }
+        b->flights[kept] = *f;
+        b->slow_hits[kept] = *hit;
+        b->slow_rays[kept++] = b->slow_rays[i];
+    }
+    *count = kept;
+    return result;
+}
+
 // One step of all slow flights: from their hits to the hits of what follows.
 static lx_result step(lx_gather_batch *b, const lx_gather_settings *settings, const lx_gather_output *out, lx_error *error)
 {
-    const size_t count = b->slow_count;
-    size_t vertex_count = 0, kept = 0;
+    size_t count = b->slow_count, vertex_count = 0, kept = 0;
+    lx_result result = finish_simple(b, settings, &count, out, error);
+    if (result != LX_OK) return result;
     lx_shade_hits(settings->tracer, b->slow_rays, b->slow_hits, b->shading, count);
     for (size_t i = 0; i < count; ++i) {
         flight f = b->flights[i];
         lx_ray ray = b->slow_rays[i];
         const lx_hit *hit = &b->slow_hits[i];
-        if (hit->surface == LX_MISS) {
-            add_sky(settings, out, f.throughput, f.cosine, f.target, ray.direction, f.vertex);
-            continue;
-        }
         const lx_shading *s = &b->shading[i];
-        const bool again = hit->surface == f.last_surface && hit->triangle == f.last_triangle;
-        if (!again) add_emission(settings, out, &f, &ray, hit, s);
-        if (again || passes_on(&f, s)) {
-            if (++f.passes > most_passes) continue;
-            f.last_surface = hit->surface;
-            f.last_triangle = hit->triangle;
-            lx_ray_step_past(&ray, hit);
-            b->flights[kept] = f;
-            b->slow_rays[kept++] = ray;
-            continue;
-        }
-        if (!s->lit || f.vertex >= settings->bounces) continue;
-        const uint32_t luxel = slow_lookup(settings, &f, hit, s);
-        if (luxel != LX_NO_LUXEL) {
-            const lx_result result = add_slow_row(settings, &f, luxel, out, error);
-            if (result != LX_OK) return result;
-            continue;
+        const lx_lookup_surface *surface = &settings->lookup->surfaces[hit->surface];
+        if (!surface->plain) {
+            const bool again = hit->surface == f.last_surface && hit->triangle == f.last_triangle;
+            if (!again) add_emission(settings, out, &f, &ray, hit, s);
+            if (again || passes_on(&f, s)) {
+                if (++f.passes > most_passes) continue;
+                f.last_surface = hit->surface;
+                f.last_triangle = hit->triangle;
+                lx_ray_step_past(&ray, hit);
+                b->flights[kept] = f;
+                b->slow_rays[kept++] = ray;
+                continue;
+            }
+            if (!s->lit || f.vertex >= settings->bounces) continue;
+            const uint32_t luxel = slow_lookup(settings, &f, hit);
+            if (luxel != LX_NO_LUXEL) {
+                result = find_slow_row(b, settings, &f, luxel, out, error);
+                if (result != LX_OK) return result;
+                continue;
+            }
         }
         if (make_vertex(&f, s, &b->vertices[vertex_count])) ++vertex_count;
     }
+    add_slow_rows(b, settings, out);
     next_events(b, settings, vertex_count, out);
     for (size_t i = 0; i < vertex_count; ++i) {
         const vertex_record *v = &b->vertices[i];

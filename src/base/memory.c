@@ -1,3 +1,4 @@
+#define _DEFAULT_SOURCE // madvise
 #include "base/memory.h"
 
 #include <stdarg.h>
@@ -7,6 +8,9 @@
 #include <string.h>
 #if defined(__GLIBC__)
 #include <malloc.h>
+#endif
+#if defined(__linux__)
+#include <sys/mman.h>
 #endif
 
 bool lx_mul_size(size_t a, size_t b, size_t *out)
@@ -23,18 +27,33 @@ bool lx_add_size(size_t a, size_t b, size_t *out)
     return true;
 }
 
+// Large arrays are read all over: pages of 2 MiB spare most misses of address translation, and most of the faults of the first touch.
+static void *with_large_pages(void *memory, size_t bytes)
+{
+#if defined(__linux__) && defined(MADV_HUGEPAGE)
+    enum { page = 2 << 20, least = 4 << 20 };
+    if (memory && bytes >= least) {
+        const uintptr_t begin = ((uintptr_t)memory + page - 1) & ~(uintptr_t)(page - 1), end = ((uintptr_t)memory + bytes) & ~(uintptr_t)(page - 1);
+        if (end > begin) (void)madvise((void *)begin, end - begin, MADV_HUGEPAGE); // a wish: all is well without
+    }
+#else
+    (void)bytes;
+#endif
+    return memory;
+}
+
 void *lx_malloc_array(size_t count, size_t size)
 {
     size_t bytes;
     if (!lx_mul_size(count, size, &bytes)) return NULL;
-    return malloc(bytes ? bytes : 1);
+    return with_large_pages(malloc(bytes ? bytes : 1), bytes);
 }
 
 void *lx_calloc_array(size_t count, size_t size)
 {
     size_t bytes;
     if (!lx_mul_size(count, size, &bytes)) return NULL;
-    return calloc(1, bytes ? bytes : 1);
+    return with_large_pages(calloc(1, bytes ? bytes : 1), bytes);
 }
 
 void lx_free(void *memory)
