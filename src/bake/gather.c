@@ -402,38 +402,42 @@ static size_t make_starts(const gather_job *g, gather_scratch *s, uint32_t first
 }
 
 // Takes the round's sums of one layer into the estimate of one luxel. Returns how far the halves' means are apart.
-static float take_round(const gather_job *g, const float *a, const float *b, uint32_t l, lx_estimate *e)
+static float take_round(const gather_job *g, const float *a, const float *b, float unit, lx_estimate *e)
 {
     const uint32_t n = g->round_count, half = (n + 1) / 2;
-    const float unit = LX_ROW_UNIT / g->scales[l];
-    float mean[3], difference = 0;
+    const float before = (float)g->round_first, after = before + (float)n, old = before / after, new = unit / after;
+    const float of_a = unit / (float)half / 3, of_b = n > half ? unit / (float)(n - half) / 3 : 0;
+    float sum[3], difference = 0;
     for (size_t c = 0; c < 3; ++c) {
-        const float x = a[c * g->row_layers + l] * unit, y = b[c * g->row_layers + l] * unit;
-        mean[c] = (x + y) / (float)n;
-        if (n > half) difference += (x / (float)half - y / (float)(n - half)) / 3;
+        const float x = a[c * g->row_layers], y = b[c * g->row_layers];
+        sum[c] = x + y;
+        difference += x * of_a - y * of_b;
     }
-    const float before = (float)g->round_first, after = before + (float)n;
-    const float variance = difference * difference / 4;
-    e->mean.r = (e->mean.r * before + mean[0] * (float)n) / after;
-    e->mean.g = (e->mean.g * before + mean[1] * (float)n) / after;
-    e->mean.b = (e->mean.b * before + mean[2] * (float)n) / after;
-    e->variance = (e->variance * before * before + variance * (float)n * (float)n) / (after * after);
+    if (n == half) difference = 0;
+    const float share = (float)n / after;
+    e->mean.r = e->mean.r * old + sum[0] * new;
+    e->mean.g = e->mean.g * old + sum[1] * new;
+    e->mean.b = e->mean.b * old + sum[2] * new;
+    e->variance = e->variance * (old * old) + difference * difference / 4 * (share * share);
     return difference;
 }
 
-// Takes the round's sums into the estimates of one luxel.
-static void fold(const gather_job *g, const tile_state *state, const gather_scratch *s, uint32_t index, uint32_t row)
+// Takes the round's sums into the estimates of luxels first … end - 1 of the list: layer by layer, as estimates lie in memory.
+static void fold(const gather_job *g, const tile_state *state, const gather_scratch *s, uint32_t first, uint32_t end)
 {
-    const size_t first = g->stride * row, second = g->stride * ((size_t)chunk_luxels + row);
-    const size_t luxel = s->luxel[index];
-    sum_estimate *sum = &g->sums[luxel];
     for (uint32_t l = 0; l < g->layer_count; ++l) {
         if (state->frozen[l]) continue;
-        const float difference = take_round(g, s->sums + first, s->sums + second, l, &g->indirect[(size_t)l * g->luxel_count + luxel]);
-        if (g->met[l]) take_round(g, s->met + first, s->met + second, l, &g->met[l][luxel]);
-        if (g->round_first > 0) continue;
-        sum->difference += difference * g->authored[l];
-        sum->squares += difference * difference * g->authored[l] * g->authored[l];
+        const float unit = LX_ROW_UNIT / g->scales[l], authored = g->authored[l];
+        lx_estimate *indirect = g->indirect + (size_t)l * g->luxel_count, *met = g->met[l];
+        for (uint32_t i = first; i < end; ++i) {
+            const size_t a = g->stride * (i - first) + l, b = a + g->stride * chunk_luxels;
+            const uint32_t luxel = s->luxel[i];
+            const float difference = take_round(g, s->sums + a, s->sums + b, unit, &indirect[luxel]);
+            if (met) take_round(g, s->met + a, s->met + b, unit, &met[luxel]);
+            if (g->round_first > 0) continue;
+            g->sums[luxel].difference += difference * authored;
+            g->sums[luxel].squares += difference * difference * authored * authored;
+        }
     }
 }
 
@@ -479,7 +483,7 @@ static lx_result gather_tile(void *user, size_t task, uint32_t worker, lx_error 
         const lx_gather_output out = {.sums = s->sums, .met = s->met};
         const lx_result result = lx_gather_trace(s->batch, &g->settings, s->starts, count, &out, error);
         if (result != LX_OK) return result;
-        for (uint32_t i = first; i < end; ++i) fold(g, state, s, i, i - first);
+        fold(g, state, s, first, end);
     }
     return LX_OK;
 }
