@@ -17,7 +17,7 @@ enum { viewer_count = sizeof viewers / sizeof *viewers };
 typedef struct tube {
     lx_light_leaf leaves[triangles]; // by triangle
     lx_light_tree tree;
-    uint32_t root;
+    lx_light_roots roots;
 } tube;
 
 static lx_vec3 corner_at(uint32_t i, uint32_t k)
@@ -28,7 +28,7 @@ static lx_vec3 corner_at(uint32_t i, uint32_t k)
 
 static void make_tube(tube *t, bool both_sides)
 {
-    *t = (tube){.root = 0};
+    *t = (tube){.roots = {0}};
     for (uint32_t i = 0, n = 0; i < along; ++i)
         for (uint32_t k = 0; k < around; ++k)
             for (uint32_t half = 0; half < 2; ++half, ++n) {
@@ -47,7 +47,7 @@ static void make_tube(tube *t, bool both_sides)
     t->tree.share_of = calloc(triangles, sizeof *t->tree.share_of);
     static lx_light_leaf shuffled[triangles];
     for (uint32_t n = 0; n < triangles; ++n) shuffled[n] = t->leaves[n];
-    assert_int_equal(lx_light_tree_add(&t->tree, shuffled, triangles, &t->root, NULL), LX_OK);
+    assert_int_equal(lx_light_tree_add(&t->tree, shuffled, triangles, &t->roots, NULL), LX_OK);
 }
 
 // Light of a triangle's centre at the viewer, without the receiver's cosine.
@@ -78,7 +78,7 @@ static void every_triangle_that_shines_can_be_chosen_and_probabilities_add_up(vo
             for (uint32_t i = 0; i < 20000; ++i) {
                 float u = lx_unit_float(lx_hash32(i)), p;
                 uint32_t n;
-                failures += !lx_light_tree_sample(&t.tree, t.root, viewers[v], &u, &n, &p);
+                failures += !lx_light_tree_sample(&t.tree, t.roots.root, viewers[v], &u, &n, &p);
             }
             const double lost = 1 - sum;
             assert_true(fabs(failures / 20000.0 - lost) < 5 * sqrt(fmax(lost, 0) / 20000) + 1e-3);
@@ -100,7 +100,7 @@ static void draws_follow_the_probabilities(void **state)
         for (uint32_t i = 0; i < draws; ++i) {
             float u = lx_unit_float(lx_hash32(i * 2 + 1)), p;
             uint32_t n;
-            if (!lx_light_tree_sample(&t.tree, t.root, viewers[v], &u, &n, &p)) continue;
+            if (!lx_light_tree_sample(&t.tree, t.roots.root, viewers[v], &u, &n, &p)) continue;
             assert_true(u >= 0 && u < 1);
             assert_true(fabsf(p - lx_light_tree_probability(&t.tree, n, viewers[v])) < 1e-5f * p);
             ++counts[n];
