@@ -157,11 +157,44 @@ static void variance_near_a_long_tube_is_a_fraction_of_that_by_power(void **stat
     lx_light_tree_release(&t.tree);
 }
 
+// One table for receivers around a place: what each gets by it, over evenly spread draws, is the sum over all triangles.
+static void table_of_a_view_gives_each_receiver_its_light(void **state)
+{
+    (void)state;
+    static tube t;
+    make_tube(&t, false);
+    static lx_light_table table;
+    const lx_light_view view = {.centre = {0.3f, -1.2f, 0.4f}, .normal = {0, 0.8f, -0.6f}, .radius = 0.1f, .spread = 0.05f};
+    assert_true(lx_light_table_fill(&table, &t.tree, &t.roots, &view));
+    assert_false(table.rough);
+    static const lx_vec3 offsets[] = {{0, 0, 0}, {0.09f, 0, 0}, {-0.05f, 0.04f, 0.06f}, {0, -0.06f, -0.07f}};
+    for (size_t r = 0; r < sizeof offsets / sizeof *offsets; ++r) {
+        const lx_vec3 viewer = lx_add(view.centre, offsets[r]);
+        double expected = 0, got = 0;
+        for (uint32_t n = 0; n < triangles; ++n) expected += light_of(&t.leaves[n], viewer);
+        for (uint32_t i = 0; i < draws; ++i) {
+            float u = ((float)i + 0.5f) / draws, p;
+            uint32_t n;
+            if (!lx_light_table_sample(&table, &t.tree, viewer, &u, &n, &p)) continue;
+            assert_true(u >= 0 && u < 1 && p > 0 && p <= 1);
+            got += light_of(&t.leaves[n], viewer) / (double)p / draws;
+        }
+        assert_true(fabs(got / expected - 1) < 1e-3); // draws are a stratum of 1 / 200000 each, and there are 960 triangles
+    }
+    // From within a hand's breadth each receiver sees another part of the tube; with its back to it none sees anything.
+    const lx_light_view near = {.centre = {0.3f, -0.2f, 0}, .normal = {0, 1, 0}, .radius = 0.2f, .spread = 0.01f};
+    assert_true(lx_light_table_fill(&table, &t.tree, &t.roots, &near) && table.rough);
+    const lx_light_view back = {.centre = {0.3f, -1.2f, 0.4f}, .normal = {0, -1, 0}, .radius = 0.1f, .spread = 0.01f};
+    assert_false(lx_light_table_fill(&table, &t.tree, &t.roots, &back));
+    lx_light_tree_release(&t.tree);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_triangle_that_shines_can_be_chosen_and_probabilities_add_up),
         cmocka_unit_test(draws_follow_the_probabilities),
+        cmocka_unit_test(table_of_a_view_gives_each_receiver_its_light),
         cmocka_unit_test(variance_near_a_long_tube_is_a_fraction_of_that_by_power),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
