@@ -69,6 +69,7 @@ struct lx_direct_batch {
     uint32_t owner[ray_batch]; // a look, or a sum
     uint8_t run[ray_batch];
     uint64_t ray_count;
+    lx_source_view view;
     // Per luxel of a chunk and cell.
     lx_rgb *sums;
     float (*run_sums)[runs]; // mean of the channels
@@ -82,6 +83,8 @@ typedef struct job {
     uint32_t source, key, cells, weight;
     uint32_t samples; // of a luxel, at most
     uint32_t first_samples; // of which so many come first, then four times as many, and so on
+    bool has_views;
+    uint32_t viewed; // luxel that the view is of; most_luxels: none yet
     float noise, least; // standard error wanted, of the light or of `least`
 } job;
 
@@ -187,13 +190,17 @@ static bool is_sharp(const lx_tracer *tracer, uint32_t source)
 
 // ---- samples ------------------------------------------------------------------------------------------------------------------
 
-static bool take_sample(const job *j, uint32_t luxel, uint32_t i, lx_ray *ray, lx_rgb *light, uint32_t *cell)
+// The first samples ask the source itself, further ones a view of it: most luxels that it reaches take enough of them for that.
+static bool take_sample(job *j, uint32_t luxel, uint32_t i, lx_ray *ray, lx_rgb *light, uint32_t *cell)
 {
-    const lx_receiver *site = &j->tile->sites[(size_t)luxel * lx_direct_sites + i % lx_direct_sites];
+    const lx_receiver *sites = &j->tile->sites[(size_t)luxel * lx_direct_sites], *site = &sites[i % lx_direct_sites];
     if (lx_source_bound(j->tracer, j->source, site) == 0) return false;
     j->b->luxels[luxel].possible = true;
     const lx_vec2 u = lx_sobol_pair(i, lx_hash_combine(j->tile->stream[luxel], j->key));
-    return lx_sample_source(j->tracer, j->source, site, u, j->weight, ray, light, cell);
+    if (!j->has_views || i < probes) return lx_sample_source(j->tracer, j->source, site, u, j->weight, ray, light, cell);
+    if (j->viewed != luxel) lx_source_view_fill(&j->b->view, j->tracer, j->source, sites, lx_direct_sites);
+    j->viewed = luxel;
+    return lx_source_view_sample(&j->b->view, i % lx_direct_sites, u, j->weight, ray, light, cell);
 }
 
 static void trace_rays(const job *j, size_t count)
@@ -235,7 +242,7 @@ static void judge(lx_direct_batch *b, uint32_t luxel)
 }
 
 // Takes the listed luxels' looks up to number `end` and judges them.
-static void look_at(const job *j, const uint16_t *list, uint32_t list_count, uint32_t end)
+static void look_at(job *j, const uint16_t *list, uint32_t list_count, uint32_t end)
 {
     lx_direct_batch *b = j->b;
     size_t count = 0;
@@ -296,7 +303,7 @@ static float count_looks(const job *j, uint32_t luxel, const uint16_t *around, u
     return squares > 0 ? light * light / squares : 0;
 }
 
-static void look_where_it_matters(const job *j)
+static void look_where_it_matters(job *j)
 {
     lx_direct_batch *b = j->b;
     uint16_t around[8];
@@ -369,7 +376,7 @@ static void clear_sums(const job *j, uint32_t slots)
 }
 
 // Adds samples first … end of a luxel without asking what is in their way. Those that were looked at are remembered.
-static void add_unshadowed(const job *j, uint32_t luxel, uint32_t first, uint32_t end, uint32_t samples)
+static void add_unshadowed(job *j, uint32_t luxel, uint32_t first, uint32_t end, uint32_t samples)
 {
     lx_direct_batch *b = j->b;
     for (uint32_t i = first; i < end; ++i) {
@@ -384,7 +391,7 @@ static void add_unshadowed(const job *j, uint32_t luxel, uint32_t first, uint32_
     }
 }
 
-static void sum_evenly_lit(const job *j, uint32_t luxel, lx_rgb *mean, float *variance)
+static void sum_evenly_lit(job *j, uint32_t luxel, lx_rgb *mean, float *variance)
 {
     clear_sums(j, 1);
     uint32_t samples = j->samples;
@@ -413,7 +420,7 @@ static void finish_sums(const job *j, size_t count)
 }
 
 // Rays of the listed slots' samples up to number `end`; the first `done` were taken before, or looked at.
-static void sum_samples(const job *j, const uint16_t *list, const uint8_t *slots, uint32_t slot_count, uint32_t done, uint32_t end)
+static void sum_samples(job *j, const uint16_t *list, const uint8_t *slots, uint32_t slot_count, uint32_t done, uint32_t end)
 {
     lx_direct_batch *b = j->b;
     size_t count = 0;
@@ -445,7 +452,7 @@ static bool is_sure(const job *j, uint32_t slot, uint32_t samples)
 }
 
 // The listed luxels by rays of their samples: all of them, or as many as make them sure enough.
-static void sum_shadowed(const job *j, const uint16_t *list, uint32_t list_count, lx_rgb *mean, float *variance)
+static void sum_shadowed(job *j, const uint16_t *list, uint32_t list_count, lx_rgb *mean, float *variance)
 {
     lx_direct_batch *b = j->b;
     uint8_t slots[chunk_luxels];
@@ -480,6 +487,8 @@ bool lx_direct_light(lx_direct_batch *b, const lx_direct_settings *settings, con
              .cells = lx_tracer_cell_count(tracer, source), .weight = lx_direct_sample_weight(tracer, source)};
     j.samples = is_sharp(tracer, source) ? (uint32_t)lx_direct_sites : settings->samples * j.weight;
     j.first_samples = j.samples;
+    j.has_views = lx_source_has_views(tracer, source);
+    j.viewed = most_luxels;
     j.noise = settings->noise;
     j.least = darkest * 20 * tracer->source_scales[source]; // which are a twentieth of the mean
     // A monitor's cells must each be sure; and without a bound nothing ends early.

@@ -13,6 +13,7 @@ enum { most_without_tree = 8 };
 enum { max_grid = 64, least_lookups = 3, most_lookups = 16 }; // lookups: per edge of a piece
 static const float lookup_budget = 1 << 24; // for a surface, beyond the least: some tenths of a second
 static const float least_share = 0.02f; // of a triangle's mean brightness, for every piece
+static const float piece_budget = 1 << 15; // for a surface: more would not stay in a processor's cache, and what has many triangles needs less of each
 
 static float brightness_of(lx_rgb c)
 {
@@ -27,10 +28,18 @@ static lx_vec2 piece_point(uint32_t grid, uint32_t i, uint32_t j, uint32_t k, fl
                   : (lx_vec2){((float)(i + 1) - a) / n, ((float)(j + 1) - b) / n};
 }
 
-// Lower halves lie inside where i + j < n, upper ones where i + j < n - 1.
-static bool piece_is_inside(uint32_t grid, uint32_t i, uint32_t j, uint32_t k)
+// Pieces are numbered row by row. Row i has n - i lower halves and, between them, n - i - 1 upper ones; it and all after it have (n - i)².
+static uint32_t piece_number(uint32_t grid, uint32_t i, uint32_t j, uint32_t k)
 {
-    return i + j + k < grid;
+    return grid * grid - (grid - i) * (grid - i) + 2 * j + k;
+}
+
+static void piece_of_number(uint32_t grid, uint32_t number, uint32_t *i, uint32_t *j, uint32_t *k)
+{
+    const uint32_t rest = grid * grid - number, edge = (uint32_t)ceilf(sqrtf((float)rest)); // exact: grid² is small
+    *i = grid - edge;
+    *j = (edge * edge - rest) / 2;
+    *k = (edge * edge - rest) % 2;
 }
 
 static float mean_brightness(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, uint32_t grid, uint32_t i,
@@ -73,10 +82,10 @@ static float texels_across(const lx_tracer *tracer, uint32_t surface, uint32_t t
     return longest;
 }
 
-// Pieces of two texels across.
-static uint32_t choose_grid(float texels)
+// Pieces of two texels across, as far as the budget goes.
+static uint32_t choose_grid(float texels, uint32_t triangle_count)
 {
-    return (uint32_t)lx_clamp(ceilf(texels * 0.5f), 1, max_grid);
+    return (uint32_t)lx_clamp(lx_min(ceilf(texels * 0.5f), sqrtf(piece_budget / (float)triangle_count)), 1, max_grid);
 }
 
 // So many that no texel of a large picture is overlooked, as far as the budget goes.
@@ -97,6 +106,13 @@ static void build_guide(const float *cdf, uint32_t count, uint32_t *guide)
     }
 }
 
+static void build_piece_guide(const float *cdf, uint32_t count, uint16_t *guide)
+{
+    uint32_t wide[max_grid * max_grid];
+    build_guide(cdf, count, wide);
+    for (uint32_t k = 0; k < count; ++k) guide[k] = (uint16_t)wide[k];
+}
+
 // Fills the piece table of one triangle; returns its mean brightness.
 static lx_result build_pieces(const lx_tracer *tracer, lx_emitters *emitters, size_t *capacity, lx_emitter_triangle *t,
                               uint32_t lookups, float *out_mean, lx_error *error)
@@ -106,36 +122,32 @@ static lx_result build_pieces(const lx_tracer *tracer, lx_emitters *emitters, si
         *out_mean = mean_brightness(tracer, t->surface, t->triangle, 1, 0, 0, 0, lookups);
         return LX_OK;
     }
-    const size_t entries = 2 * (size_t)n * n;
+    const uint32_t entries = n * n;
     if (emitters->piece_count + entries + 1 > UINT32_MAX ||
-        !lx_array_reserve(&emitters->piece_cdf, &capacity[0], emitters->piece_count + entries + 1, sizeof(float)) ||
-        !lx_array_reserve(&emitters->piece_guide, &capacity[1], emitters->piece_count + entries + 1, sizeof(uint32_t)))
+        !lx_array_reserve(&emitters->piece_cdf, &capacity[0], emitters->piece_count + entries + 1, sizeof *emitters->piece_cdf) ||
+        !lx_array_reserve(&emitters->piece_guide, &capacity[1], emitters->piece_count + entries + 1, sizeof *emitters->piece_guide))
         return lx_fail_memory(error, "emitters");
     t->first_cdf = (uint32_t)emitters->piece_count;
     float *cdf = emitters->piece_cdf + t->first_cdf;
     emitters->piece_count += entries + 1;
     double sum = 0;
-    for (uint32_t i = 0, e = 0; i < n; ++i)
-        for (uint32_t j = 0; j < n; ++j)
-            for (uint32_t k = 0; k < 2; ++k, ++e) {
-                cdf[e + 1] = 0;
-                if (piece_is_inside(n, i, j, k))
-                    cdf[e + 1] = mean_brightness(tracer, t->surface, t->triangle, n, i, j, k, lookups);
-                sum += (double)cdf[e + 1];
-            }
-    const double mean = sum / ((double)n * n); // n² pieces lie inside
+    for (uint32_t e = 0; e < entries; ++e) {
+        uint32_t i, j, k;
+        piece_of_number(n, e, &i, &j, &k);
+        cdf[e + 1] = mean_brightness(tracer, t->surface, t->triangle, n, i, j, k, lookups);
+        sum += (double)cdf[e + 1];
+    }
+    const double mean = sum / (double)entries;
     double running = 0;
     const double floor_value = mean * (double)least_share;
     cdf[0] = 0;
-    for (uint32_t i = 0, e = 0; i < n; ++i)
-        for (uint32_t j = 0; j < n; ++j)
-            for (uint32_t k = 0; k < 2; ++k, ++e) {
-                if (piece_is_inside(n, i, j, k)) running += fmax((double)cdf[e + 1], floor_value);
-                cdf[e + 1] = (float)running;
-            }
+    for (uint32_t e = 0; e < entries; ++e) {
+        running += fmax((double)cdf[e + 1], floor_value);
+        cdf[e + 1] = (float)running;
+    }
     if (running > 0)
-        for (size_t e = 1; e <= entries; ++e) cdf[e] = (float)((double)cdf[e] / running);
-    build_guide(cdf, (uint32_t)entries, emitters->piece_guide + t->first_cdf);
+        for (uint32_t e = 1; e <= entries; ++e) cdf[e] = (float)((double)cdf[e] / running);
+    build_piece_guide(cdf, entries, emitters->piece_guide + t->first_cdf);
     *out_mean = (float)mean;
     return LX_OK;
 }
@@ -164,7 +176,7 @@ static lx_result add_surface(lx_tracer *tracer, lx_emitters *emitters, size_t *t
         t->normal = lx_normalize_or(cross, (lx_vec3){0, 0, 0});
         t->area = 0.5f * lx_length(cross);
         const float texels = t->area > 0 ? texels_across(tracer, surface, i) : 0;
-        t->grid = choose_grid(texels);
+        t->grid = choose_grid(texels, primitive->triangle_count);
         const uint32_t lookups = choose_lookups(texels, t->grid, primitive->triangle_count);
         float mean = 0;
         const lx_result result = build_pieces(tracer, emitters, piece_capacity, t, lookups, &mean, error);
@@ -179,7 +191,7 @@ static lx_result add_surface(lx_tracer *tracer, lx_emitters *emitters, size_t *t
 static lx_result build_tree(const lx_tracer *tracer, lx_emitters *emitters, uint32_t source, lx_light_leaf *leaves, lx_error *error)
 {
     uint32_t count = 0;
-    emitters->tree_roots[source] = LX_NO_LIGHT_NODE;
+    emitters->roots[source].root = LX_NO_LIGHT_NODE;
     if (tracer->source_cells[source] > 0) return LX_OK;
     for (uint32_t i = emitters->first_triangle[source]; i < emitters->first_triangle[source + 1]; ++i) {
         const lx_emitter_triangle *t = &emitters->triangles[i];
@@ -189,18 +201,17 @@ static lx_result build_tree(const lx_tracer *tracer, lx_emitters *emitters, uint
         lx_triangle_corners(tracer, t->surface, t->triangle, leaf->corner);
     }
     if (count <= most_without_tree) return LX_OK;
-    for (uint32_t k = 0; k < count; ++k) emitters->triangles[leaves[k].triangle].in_tree = true;
-    return lx_light_tree_add(&emitters->tree, leaves, count, &emitters->tree_roots[source], error);
+    return lx_light_tree_add(&emitters->tree, leaves, count, &emitters->roots[source], error);
 }
 
 static lx_result build_trees(const lx_tracer *tracer, lx_emitters *emitters, lx_error *error)
 {
     emitters->tree.place = lx_calloc_array(emitters->triangle_count, sizeof *emitters->tree.place);
     emitters->tree.share_of = lx_calloc_array(emitters->triangle_count, sizeof *emitters->tree.share_of);
-    emitters->tree_roots = lx_calloc_array(tracer->scene->source_count, sizeof *emitters->tree_roots);
+    emitters->roots = lx_calloc_array(tracer->scene->source_count, sizeof *emitters->roots);
     lx_light_leaf *leaves = lx_malloc_array(emitters->triangle_count, sizeof *leaves);
     lx_result result = LX_OK;
-    if (!emitters->tree.place || !emitters->tree.share_of || !emitters->tree_roots || !leaves) result = lx_fail_memory(error, "light tree");
+    if (!emitters->tree.place || !emitters->tree.share_of || !emitters->roots || !leaves) result = lx_fail_memory(error, "light tree");
     for (uint32_t source = 0; result == LX_OK && source < tracer->scene->source_count; ++source)
         result = build_tree(tracer, emitters, source, leaves, error);
     lx_free(leaves);
@@ -255,15 +266,14 @@ void lx_emitters_release(lx_emitters *emitters)
     lx_free(emitters->piece_guide);
     lx_free(emitters->first_triangle);
     lx_free(emitters->source_power);
-    lx_free(emitters->tree_roots);
+    lx_free(emitters->roots);
     lx_light_tree_release(&emitters->tree);
     *emitters = (lx_emitters){0};
 }
 
-// Step of a running sum that u falls into; u becomes its place within the step.
-static uint32_t choose(const float *cdf, const uint32_t *guide, uint32_t count, float *u)
+// Step of a running sum that u falls into, no earlier than `low`; u becomes its place within the step.
+static uint32_t find_step(const float *cdf, uint32_t low, uint32_t count, float *u)
 {
-    uint32_t low = guide[(uint32_t)(*u * (float)count)];
     while (low + 1 < count && cdf[low + 1] <= *u) ++low;
     const float width = cdf[low + 1] - cdf[low];
     *u = width > 0 ? lx_clamp((*u - cdf[low]) / width, 0, 0x1.fffffep-1f) : 0.5f;
@@ -271,24 +281,26 @@ static uint32_t choose(const float *cdf, const uint32_t *guide, uint32_t count, 
 }
 
 // A triangle of a source for a viewer, and how probable it was; u becomes its place within the choice.
-static const lx_emitter_triangle *choose_triangle(const lx_emitters *emitters, uint32_t source, lx_vec3 viewer, float *u, float *probability)
+static const lx_emitter_triangle *choose_triangle(const lx_emitters *emitters, uint32_t source, const lx_light_table *table, lx_vec3 viewer, float *u,
+                                                  float *probability)
 {
-    if (emitters->tree_roots[source] != LX_NO_LIGHT_NODE) {
-        uint32_t index;
-        return lx_light_tree_sample(&emitters->tree, emitters->tree_roots[source], viewer, u, &index, probability) ? &emitters->triangles[index] : NULL;
-    }
+    uint32_t index;
+    if (table) return lx_light_table_sample(table, &emitters->tree, viewer, u, &index, probability) ? &emitters->triangles[index] : NULL;
+    if (lx_emitters_has_tree(emitters, source))
+        return lx_light_tree_sample(&emitters->tree, emitters->roots[source].root, viewer, u, &index, probability) ? &emitters->triangles[index] : NULL;
     const uint32_t first = emitters->first_triangle[source], count = emitters->first_triangle[source + 1] - first;
     const float *cdf = emitters->triangle_cdf + first + source;
     if (count == 0 || !(cdf[count] > 0)) return NULL;
-    const lx_emitter_triangle *t = &emitters->triangles[first + choose(cdf, emitters->triangle_guide + first + source, count, u)];
+    const uint32_t *guide = emitters->triangle_guide + first + source;
+    const lx_emitter_triangle *t = &emitters->triangles[first + find_step(cdf, guide[(uint32_t)(*u * (float)count)], count, u)];
     *probability = t->probability;
     return t->probability > 0 ? t : NULL;
 }
 
-bool lx_emitters_sample(const lx_emitters *emitters, uint32_t source, lx_vec3 viewer, lx_vec2 u, lx_emitter_sample *out)
+bool lx_emitters_sample(const lx_emitters *emitters, uint32_t source, const lx_light_table *table, lx_vec3 viewer, lx_vec2 u, lx_emitter_sample *out)
 {
     float probability;
-    const lx_emitter_triangle *t = choose_triangle(emitters, source, viewer, &u.x, &probability);
+    const lx_emitter_triangle *t = choose_triangle(emitters, source, table, viewer, &u.x, &probability);
     if (!t) return false;
     *out = (lx_emitter_sample){.triangle = t, .pdf_area = probability / t->area};
     if (t->grid == 1) {
@@ -297,22 +309,25 @@ bool lx_emitters_sample(const lx_emitters *emitters, uint32_t source, lx_vec3 vi
         out->v = b.y;
         return true;
     }
-    const uint32_t n = t->grid, entries = 2 * n * n;
+    const uint32_t n = t->grid, entries = n * n;
     const float *pieces = emitters->piece_cdf + t->first_cdf;
-    const uint32_t e = choose(pieces, emitters->piece_guide + t->first_cdf, entries, &u.x);
-    const lx_vec2 local = lx_sample_triangle(u);
-    const lx_vec2 b = piece_point(n, e / 2 / n, e / 2 % n, e % 2, local.x, local.y);
+    const uint16_t *guide = emitters->piece_guide + t->first_cdf;
+    const uint32_t e = find_step(pieces, guide[(uint32_t)(u.x * (float)entries)], entries, &u.x);
+    uint32_t i, j, k;
+    piece_of_number(n, e, &i, &j, &k);
+    const lx_vec2 local = lx_sample_triangle(u), b = piece_point(n, i, j, k, local.x, local.y);
     out->u = b.x;
     out->v = b.y;
-    out->pdf_area *= (pieces[e + 1] - pieces[e]) * (float)(n * n);
+    out->pdf_area *= (pieces[e + 1] - pieces[e]) * (float)entries;
     return out->pdf_area > 0;
 }
 
-float lx_emitters_pdf_area(const lx_emitters *emitters, uint32_t index, lx_vec3 viewer, float u, float v)
+float lx_emitters_pdf_area(const lx_emitters *emitters, uint32_t source, uint32_t index, lx_vec3 viewer, float u, float v)
 {
     const lx_emitter_triangle *t = &emitters->triangles[index];
     if (!(t->probability > 0)) return 0;
-    const float probability = t->in_tree ? lx_light_tree_probability(&emitters->tree, index, viewer) : t->probability;
+    const bool by_tree = lx_emitters_has_tree(emitters, source);
+    const float probability = by_tree ? lx_light_tree_probability(&emitters->tree, index, viewer) : t->probability;
     const float uniform = probability / t->area;
     if (t->grid == 1) return uniform;
     const uint32_t n = t->grid;
@@ -321,9 +336,9 @@ float lx_emitters_pdf_area(const lx_emitters *emitters, uint32_t index, lx_vec3 
     if (i >= n) i = n - 1;
     if (j >= n) j = n - 1;
     uint32_t k = (x - (float)i) + (y - (float)j) > 1 ? 1 : 0;
-    if (!piece_is_inside(n, i, j, k)) k = 0; // a hit on the long edge, rounded outwards
-    if (!piece_is_inside(n, i, j, k)) return 0;
-    const uint32_t e = (i * n + j) * 2 + k;
+    if (i + j + k >= n) k = 0; // a hit on the long edge, rounded outwards
+    if (i + j >= n) return 0;
+    const uint32_t e = piece_number(n, i, j, k);
     const float *pieces = emitters->piece_cdf + t->first_cdf;
     return uniform * (pieces[e + 1] - pieces[e]) * (float)(n * n);
 }

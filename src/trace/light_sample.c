@@ -1,7 +1,8 @@
 // Next-event estimation, one function per kind of source.
 //
 // Lamps (point, spot, directional, rectangle, disk) are invisible to rays, so their samples carry the whole weight. Emissive surfaces
-// and sky pictures can also be hit; samples and hits share the weight by the power heuristic of Veach 1997, section 9.2.4.
+// and sky pictures can also be hit; samples and hits share the weight by the power heuristic of Veach 1997, section 9.2.4. What a source's place tells to be
+// small and far gets samples alone: its samples may then be chosen by tables, whose densities need not be found again at hits.
 // Rectangles are sampled by solid angle ([Urena2013]); disks through their bounding square, points outside it count 0, which keeps the
 // density bounded right up to the disk. From far away both are sampled by area. Spheres by their visible cap ([PBR4] 6.2.4).
 #include "trace/light_sample.h"
@@ -154,13 +155,32 @@ static bool sample_area(const lx_light *light, const lx_receiver *r, lx_vec2 u, 
     return true;
 }
 
-static bool sample_emissive(const lx_tracer *tracer, uint32_t source, const lx_receiver *r, lx_vec2 u, uint32_t count, lx_ray *ray,
-                            lx_rgb *irradiance, uint32_t *cell)
+// Solid angles (of even brightness, facing the place) below which cosine-weighted rays have no say: they find such a source so seldom that their share of
+// the weight would be below a hundredth.
+static const float small_solid_angle = 0.05f;
+
+static bool is_small(const lx_source_sphere *s, float nearest)
+{
+    return nearest > 0 && s->power < small_solid_angle * nearest * nearest;
+}
+
+// Is the source so small, seen from where rays start, that samples alone bring its light? A matter of the source and the place.
+static bool has_samples_alone(const lx_tracer *tracer, uint32_t source, lx_vec3 origin)
+{
+    if (!lx_emitters_has_tree(&tracer->emitters, source)) return false;
+    const lx_source_sphere *s = &tracer->source_spheres[source];
+    if (is_small(s, lx_distance(s->centre, origin) - s->radius)) return true;
+    return lx_light_tree_sum(&tracer->emitters.tree, &tracer->emitters.roots[source], origin) * s->power < small_solid_angle;
+}
+
+static bool sample_emissive(const lx_tracer *tracer, uint32_t source, const lx_source_view *view, const lx_receiver *r, lx_vec2 u, uint32_t count,
+                            lx_ray *ray, lx_rgb *irradiance, uint32_t *cell)
 {
     // Seen from where rays start, so that hits are weighed by the same densities.
     const lx_vec3 origin = ray_origin(r);
+    const bool alone = view ? view->alone[r - view->receivers] : has_samples_alone(tracer, source, origin);
     lx_emitter_sample s;
-    if (!lx_emitters_sample(&tracer->emitters, source, origin, u, &s)) return false;
+    if (!lx_emitters_sample(&tracer->emitters, source, view && alone && !view->table.rough ? &view->table : NULL, origin, u, &s)) return false;
     const lx_emitter_triangle *t = s.triangle;
     const lx_vec3 point = lx_mad(lx_mad(t->origin, t->edge1, s.u), t->edge2, s.v);
     const lx_vec3 to_point = lx_sub(point, origin);
@@ -176,7 +196,7 @@ static bool sample_emissive(const lx_tracer *tracer, uint32_t source, const lx_r
     if (!t->plain) emission = lx_surface_emission(tracer, t->surface, t->triangle, s.u, s.v);
     if (lx_rgb_is_black(emission)) return false;
     const float pdf = s.pdf_area * distance2 / emitter_cosine; // solid angle
-    const float weight = power_heuristic((float)count * pdf, cosine / LX_PI);
+    const float weight = alone ? 1 : power_heuristic((float)count * pdf, cosine / LX_PI);
     *irradiance = lx_rgb_scale(emission, weight * cosine / pdf);
     *ray = ray_to_point(r, lx_offset_origin(point, normal));
     *cell = lx_tracer_cell_at(tracer, t->surface, t->triangle, s.u, s.v);
@@ -218,13 +238,13 @@ static bool sample_sky(const lx_tracer *tracer, const lx_receiver *r, lx_vec2 u,
     return true;
 }
 
-bool lx_sample_source(const lx_tracer *tracer, uint32_t source, const lx_receiver *receiver, lx_vec2 u, uint32_t count, lx_ray *out_ray,
-                      lx_rgb *out_irradiance, uint32_t *out_cell)
+static bool sample_source(const lx_tracer *tracer, uint32_t source, const lx_source_view *view, const lx_receiver *receiver, lx_vec2 u, uint32_t count,
+                          lx_ray *out_ray, lx_rgb *out_irradiance, uint32_t *out_cell)
 {
     *out_cell = 0;
     const lx_source *s = lx_tracer_source(tracer, source);
     if (s->kind == LX_SOURCE_SKY) return sample_sky(tracer, receiver, u, out_ray, out_irradiance);
-    if (s->kind == LX_SOURCE_EMISSIVE) return sample_emissive(tracer, source, receiver, u, count, out_ray, out_irradiance, out_cell);
+    if (s->kind == LX_SOURCE_EMISSIVE) return sample_emissive(tracer, source, view, receiver, u, count, out_ray, out_irradiance, out_cell);
     const lx_light *light = &tracer->scene->lights[s->light];
     float irradiance = 0;
     bool arrives = false;
@@ -239,6 +259,62 @@ bool lx_sample_source(const lx_tracer *tracer, uint32_t source, const lx_receive
     return arrives;
 }
 
+bool lx_sample_source(const lx_tracer *tracer, uint32_t source, const lx_receiver *receiver, lx_vec2 u, uint32_t count, lx_ray *out_ray,
+                      lx_rgb *out_irradiance, uint32_t *out_cell)
+{
+    return sample_source(tracer, source, NULL, receiver, u, count, out_ray, out_irradiance, out_cell);
+}
+
+static lx_light_view view_of(const lx_receiver *receivers, uint32_t count)
+{
+    lx_light_view v = {.normal = {0, 0, 0}};
+    lx_bounds box = lx_bounds_empty();
+    for (uint32_t i = 0; i < count; ++i) {
+        lx_bounds_add(&box, receivers[i].position);
+        v.normal = lx_add(v.normal, receivers[i].normal);
+    }
+    v.centre = lx_scale(lx_add(box.low, box.high), 0.5f);
+    v.normal = lx_normalize_or(v.normal, receivers[0].normal);
+    float radius2 = 0, spread2 = 0;
+    for (uint32_t i = 0; i < count; ++i) {
+        const lx_vec3 d = lx_sub(receivers[i].position, v.centre), e = lx_sub(receivers[i].normal, v.normal);
+        radius2 = lx_max(radius2, lx_dot(d, d));
+        spread2 = lx_max(spread2, lx_dot(e, e));
+    }
+    v.radius = sqrtf(radius2) * 1.001f + 1e-5f * lx_max_abs(v.centre); // rays start a little off their receivers
+    v.spread = sqrtf(spread2) + 1e-4f;
+    return v;
+}
+
+bool lx_source_has_views(const lx_tracer *tracer, uint32_t source)
+{
+    return lx_tracer_source(tracer, source)->kind == LX_SOURCE_EMISSIVE && lx_emitters_has_tree(&tracer->emitters, source);
+}
+
+void lx_source_view_fill(lx_source_view *view, const lx_tracer *tracer, uint32_t source, const lx_receiver *receivers, uint32_t count)
+{
+    const lx_emitters *emitters = &tracer->emitters;
+    view->tracer = tracer;
+    view->source = source;
+    view->receivers = receivers;
+    view->dark = view->has_table = false;
+    if (!lx_source_has_views(tracer, source)) return;
+    const lx_light_view place = view_of(receivers, count);
+    view->has_table = lx_light_table_fill(&view->table, &emitters->tree, &emitters->roots[source], &place);
+    view->dark = !view->has_table;
+    if (view->dark) return;
+    const lx_source_sphere *s = &tracer->source_spheres[source];
+    const bool all_far = is_small(s, lx_distance(s->centre, place.centre) - s->radius - place.radius);
+    for (uint32_t i = 0; i < count; ++i) view->alone[i] = all_far || has_samples_alone(tracer, source, ray_origin(&receivers[i]));
+}
+
+bool lx_source_view_sample(const lx_source_view *view, uint32_t receiver, lx_vec2 u, uint32_t count, lx_ray *out_ray, lx_rgb *out_irradiance,
+                           uint32_t *out_cell)
+{
+    return !view->dark && sample_source(view->tracer, view->source, view->has_table ? view : NULL, &view->receivers[receiver], u, count, out_ray,
+                                        out_irradiance, out_cell);
+}
+
 float lx_light_roulette(uint32_t stream, uint32_t sample, uint32_t key, float brings, float scale)
 {
     if (!(brings < scale)) return 1;
@@ -249,8 +325,11 @@ float lx_light_roulette(uint32_t stream, uint32_t sample, uint32_t key, float br
 
 float lx_hit_weight(const lx_tracer *tracer, const lx_ray *ray, const lx_hit *hit, lx_vec3 hit_normal, float cosine, uint32_t count)
 {
+    const uint32_t source = (uint32_t)tracer->scene->surfaces[hit->surface].source;
     const uint32_t index = tracer->surfaces[hit->surface].first_emitter_triangle + hit->triangle;
-    const float pdf_area = lx_emitters_pdf_area(&tracer->emitters, index, ray->origin, hit->u, hit->v);
+    const float pdf_area = lx_emitters_pdf_area(&tracer->emitters, source, index, ray->origin, hit->u, hit->v);
+    if (!(pdf_area > 0)) return 1;
+    if (has_samples_alone(tracer, source, ray->origin)) return 0;
     const float emitter_cosine = fabsf(lx_dot(hit_normal, ray->direction)); // directions of such rays are unit
     const float pdf = emitter_cosine > 0 ? pdf_area * hit->t * hit->t / emitter_cosine : 0;
     return power_heuristic(cosine / LX_PI, (float)count * pdf);

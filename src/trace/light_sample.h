@@ -2,6 +2,7 @@
 #ifndef LX_TRACE_LIGHT_SAMPLE_H
 #define LX_TRACE_LIGHT_SAMPLE_H
 
+#include "trace/light_tree.h"
 #include "trace/tracer.h"
 
 /// A place that receives light. Normals are unit and on the same side.
@@ -17,6 +18,27 @@ typedef struct lx_receiver {
 /// (the caller averages them). `out_cell`: of the sampled point, see lx_tracer_cell_at. False: nothing arrives, no ray.
 bool lx_sample_source(const lx_tracer *tracer, uint32_t source, const lx_receiver *receiver, lx_vec2 u, uint32_t count, lx_ray *out_ray,
                       lx_rgb *out_irradiance, uint32_t *out_cell);
+
+enum { lx_view_receivers = 16 };
+
+/// What many samples of one source from receivers close together share.
+typedef struct lx_source_view {
+    const lx_tracer *tracer;
+    uint32_t source;
+    const lx_receiver *receivers;
+    bool dark;      ///< Certainly nothing reaches any of them.
+    bool has_table; ///< `table` and `alone` hold.
+    bool alone[lx_view_receivers]; ///< Samples bring all light; else hits have a share of it.
+    lx_light_table table;
+} lx_source_view;
+
+/// Does a view of the source differ from asking it each time?
+bool lx_source_has_views(const lx_tracer *tracer, uint32_t source);
+/// Looks at a source from `count` receivers, at most lx_view_receivers. Worth it for a dozen samples or more.
+void lx_source_view_fill(lx_source_view *view, const lx_tracer *tracer, uint32_t source, const lx_receiver *receivers, uint32_t count);
+/// The same estimate as lx_sample_source by other samples, of a receiver that the view was filled with.
+bool lx_source_view_sample(const lx_source_view *view, uint32_t receiver, lx_vec2 u, uint32_t count, lx_ray *out_ray, lx_rgb *out_irradiance,
+                           uint32_t *out_cell);
 
 /// A cheap upper estimate of the irradiance that a source of strength 1 can give a receiver: 0 if it certainly gives none (below the horizon, outside
 /// the cone or the range, behind a one-sided lamp), infinity if nothing is known. Within the source's own bounds it is infinity too.

@@ -119,6 +119,7 @@ static void bound_child(lx_light_node *node, uint32_t child, const lx_light_leaf
     node->y[child] = centre.y;
     node->z[child] = centre.z;
     node->radius2[child] = radius2 * 1.001f;
+    node->radius[child] = sqrtf(radius2 * 1.001f);
     node->axis_x[child] = axis.x;
     node->axis_y[child] = axis.y;
     node->axis_z[child] = axis.z;
@@ -183,14 +184,61 @@ static lx_result add_node(lx_light_tree *tree, lx_light_leaf *leaves, uint32_t c
     return LX_OK;
 }
 
-lx_result lx_light_tree_add(lx_light_tree *tree, lx_light_leaf *leaves, uint32_t count, uint32_t *out_root, lx_error *error)
+static bool is_inner(const lx_light_node *n, uint32_t child)
 {
-    return add_node(tree, leaves, count, LX_NO_LIGHT_NODE, out_root, error);
+    return n->power[child] > 0 && n->count[child] == 0;
+}
+
+// Nodes from the root downwards, breadth first, each as its leaves and its children's nodes, as far as `most` parts go (and
+// for a moment one more).
+static lx_result add_cut(lx_light_tree *tree, uint32_t root, uint32_t most, lx_light_cut *out, lx_error *error)
+{
+    if (tree->part_count + most + 1 > UINT32_MAX || !lx_array_reserve(&tree->parts, &tree->part_capacity, tree->part_count + most + 1, sizeof *tree->parts))
+        return lx_fail_memory(error, "light tree");
+    lx_light_branch *parts = tree->parts + tree->part_count;
+    uint32_t count = 1, at = 0;
+    parts[0] = (lx_light_branch){root, {1, 1, 1, 1}};
+    while (at < count) {
+        const lx_light_node *n = &tree->nodes[parts[at].node];
+        uint32_t inner = 0, leaves = 0;
+        for (uint32_t k = 0; k < width; ++k) {
+            inner += is_inner(n, k);
+            leaves += n->count[k] > 0;
+        }
+        if (inner == 0) {
+            ++at;
+            continue;
+        }
+        if (count + inner - (leaves == 0) > most) break;
+        for (uint32_t k = 0; k < width; ++k) {
+            if (!is_inner(n, k)) continue;
+            parts[count++] = (lx_light_branch){n->first[k], {1, 1, 1, 1}};
+            parts[at].keep[k] = 0;
+        }
+        if (leaves > 0) {
+            ++at;
+            continue;
+        }
+        --count; // nothing is left of it: the others move up, in their order
+        for (uint32_t k = at; k < count; ++k) parts[k] = parts[k + 1];
+    }
+    *out = (lx_light_cut){(uint32_t)tree->part_count, count};
+    tree->part_count += count;
+    return LX_OK;
+}
+
+lx_result lx_light_tree_add(lx_light_tree *tree, lx_light_leaf *leaves, uint32_t count, lx_light_roots *out_roots, lx_error *error)
+{
+    lx_result result = add_node(tree, leaves, count, LX_NO_LIGHT_NODE, &out_roots->root, error);
+    if (result == LX_OK) result = add_cut(tree, out_roots->root, lx_light_coarse_parts, &out_roots->coarse, error);
+    if (result == LX_OK) result = add_cut(tree, out_roots->root, lx_light_fine_parts, &out_roots->fine, error);
+    return result;
 }
 
 void lx_light_tree_release(lx_light_tree *tree)
 {
     lx_free(tree->nodes);
+    lx_free(tree->parts);
     lx_free(tree->order);
     lx_free(tree->share);
     lx_free(tree->place);
@@ -198,63 +246,105 @@ void lx_light_tree_release(lx_light_tree *tree)
     *tree = (lx_light_tree){0};
 }
 
+// Radii of a view within which its receivers see a cluster differently, and how much of all importance may lie there.
+static const float close_radii = 3, most_close = 0.25f;
+
 // ---- choices -------------------------------------------------------------------------------------------------------------------
 
 // Power × largest cosine at the emitters / d² ([PBR4] 12.6.3 without the receiver's cosine, so that places alone decide): angle from the cone's axis to
-// the viewer, less the cone's, less that of the sphere. 0: all of the child turns away. Returns the sum.
-static float find_importances(const lx_light_node *n, lx_vec3 viewer, float importance[restrict width])
+// the viewer, less the cone's, less that of the sphere. 0: all of the child turns away. Sines and cosines are kept times the distance d, so that the three
+// roots wait for nothing but d², and one division is all there is.
+static void find_importances(const lx_light_node *restrict n, lx_vec3 viewer, float importance[restrict width])
 {
     for (int k = 0; k < width; ++k) {
         const float x = viewer.x - n->x[k], y = viewer.y - n->y[k], z = viewer.z - n->z[k];
-        const float d2 = lx_max(x * x + y * y + z * z, 1e-30f);
-        const float along = (x * n->axis_x[k] + y * n->axis_y[k] + z * n->axis_z[k]) / sqrtf(d2);
-        const float c = lx_min(n->both_sides[k] != 0 ? fabsf(along) : along, 1), s = sqrtf(lx_max(0, 1 - c * c));
-        const float c1 = c * n->cos_cone[k] + s * n->sin_cone[k], s1 = s * n->cos_cone[k] - c * n->sin_cone[k];
-        const bool in_cone = c >= n->cos_cone[k];
-        const float cos_outside = in_cone ? 1 : c1, sin_outside = in_cone ? 0 : s1;
-        const float sine2 = lx_min(1, n->radius2[k] / d2), cos_sphere = sqrtf(1 - sine2), sin_sphere = sqrtf(sine2);
-        const bool in_reach = cos_outside >= cos_sphere;
-        const float cosine = in_reach ? 1 : cos_outside * cos_sphere + sin_outside * sin_sphere;
-        importance[k] = n->power[k] * lx_max(0, cosine) / lx_max(d2, n->radius2[k]);
+        const float d2 = lx_max(x * x + y * y + z * z, 1e-18f); // whose square is not 0
+        const float signed_along = x * n->axis_x[k] + y * n->axis_y[k] + z * n->axis_z[k];
+        const float along = signed_along + n->both_sides[k] * (fabsf(signed_along) - signed_along);
+        const float d = sqrtf(d2), across = sqrtf(lx_max(0, d2 - along * along)), reach = sqrtf(lx_max(0, d2 - n->radius2[k]));
+        const float c1 = along * n->cos_cone[k] + across * n->sin_cone[k], s1 = across * n->cos_cone[k] - along * n->sin_cone[k];
+        const bool in_cone = along >= n->cos_cone[k] * d;
+        const float c = in_cone ? d : c1, s = in_cone ? 0 : s1;
+        const float turned = c * reach + s * lx_min(n->radius[k], d), cosine = c >= reach ? d2 : turned;
+        importance[k] = n->power[k] * lx_max(0, cosine) / (d2 * lx_max(d2, n->radius2[k]));
     }
-    return (importance[0] + importance[1]) + (importance[2] + importance[3]);
+}
+
+// The same for all receivers of a view, as if the sphere were larger by theirs, times the largest cosine at a receiver. `close`: the importances of what
+// is so close that receivers see it differently.
+static void find_view_importances(const lx_light_node *restrict n, const lx_light_view *restrict view, const float keep[restrict width],
+                                  float importance[restrict width], float close[restrict width])
+{
+    const lx_vec3 viewer = view->centre, normal = view->normal;
+    const float close_by = close_radii * view->radius;
+    for (int k = 0; k < width; ++k) {
+        const float x = viewer.x - n->x[k], y = viewer.y - n->y[k], z = viewer.z - n->z[k], radius = n->radius[k] + view->radius, radius2 = radius * radius;
+        const float d2 = lx_max(x * x + y * y + z * z, 1e-18f);
+        const float signed_along = x * n->axis_x[k] + y * n->axis_y[k] + z * n->axis_z[k];
+        const float along = signed_along + n->both_sides[k] * (fabsf(signed_along) - signed_along);
+        const float d = sqrtf(d2), across = sqrtf(lx_max(0, d2 - along * along)), reach = sqrtf(lx_max(0, d2 - radius2));
+        const float c1 = along * n->cos_cone[k] + across * n->sin_cone[k], s1 = across * n->cos_cone[k] - along * n->sin_cone[k];
+        const bool in_cone = along >= n->cos_cone[k] * d;
+        const float c = in_cone ? d : c1, s = in_cone ? 0 : s1;
+        const float turned = c * reach + s * lx_min(radius, d), cosine = c >= reach ? d2 : turned;
+        const float height = radius + view->spread * (d + radius) - (x * normal.x + y * normal.y + z * normal.z);
+        const float received = lx_min(d, lx_max(0, height));
+        importance[k] = keep[k] * n->power[k] * received * lx_max(0, cosine) / (d2 * d * lx_max(d2, radius2));
+        close[k] = d < n->radius[k] + close_by ? importance[k] : 0;
+    }
+}
+
+static inline float add_up(const float importance[width], float sums[width])
+{
+    sums[0] = importance[0];
+    for (int k = 1; k < width; ++k) sums[k] = sums[k - 1] + importance[k];
+    return sums[width - 1];
+}
+
+// The child that `place`, a share of all importance, falls into; place becomes its share of that. Counted, not searched: which way it goes is nothing
+// that a processor could guess.
+static inline int choose_child(const float importance[width], const float sums[width], float *place)
+{
+    const float at = lx_min(*place * sums[width - 1], sums[width - 1] * 0x1.fffffep-1f); // rounding must not reach the end
+    int k = 0;
+    for (int i = 0; i < width - 1; ++i) k += at >= sums[i];
+    while (!(importance[k] > 0)) --k;
+    *place = lx_clamp((at - (sums[k] - importance[k])) / importance[k], 0, 0x1.fffffep-1f);
+    return k;
+}
+
+// A triangle of a leaf, by power.
+static inline bool choose_in_leaf(const lx_light_tree *tree, const lx_light_node *n, int k, float *u, uint32_t *triangle, float *probability)
+{
+    const float *share = tree->share + n->first[k];
+    uint32_t i = 0;
+    while (i + 1 < n->count[k] && *u >= share[i]) *u -= share[i++];
+    *u = lx_clamp(*u / share[i], 0, 0x1.fffffep-1f);
+    *triangle = tree->order[n->first[k] + i];
+    *probability *= share[i];
+    return *probability > 0;
+}
+
+// On from node `number`, which was reached with `probability`.
+static inline bool descend(const lx_light_tree *tree, uint32_t number, lx_vec3 viewer, float *u, uint32_t *triangle, float *probability)
+{
+    for (;;) {
+        const lx_light_node *n = &tree->nodes[number];
+        float importance[width], sums[width];
+        find_importances(n, viewer, importance);
+        const float total = add_up(importance, sums);
+        if (!(total > 0)) return false;
+        const int k = choose_child(importance, sums, u);
+        *probability *= importance[k] / total;
+        if (n->count[k] > 0) return choose_in_leaf(tree, n, k, u, triangle, probability);
+        number = n->first[k];
+    }
 }
 
 bool lx_light_tree_sample(const lx_light_tree *tree, uint32_t root, lx_vec3 viewer, float *u, uint32_t *triangle, float *probability)
 {
     *probability = 1;
-    for (uint32_t number = root;;) {
-        const lx_light_node *n = &tree->nodes[number];
-        float importance[width];
-        const float total = find_importances(n, viewer, importance);
-        if (!(total > 0)) return false;
-        float left = *u * total;
-        int k = 0, last = 0;
-        for (; k < width; ++k) {
-            if (!(importance[k] > 0)) continue;
-            last = k;
-            if (left < importance[k]) break;
-            left -= importance[k];
-        }
-        if (k == width) { // rounding: the end of the last one
-            k = last;
-            left = importance[k];
-        }
-        *probability *= importance[k] / total;
-        *u = lx_clamp(left / importance[k], 0, 0x1.fffffep-1f);
-        if (n->count[k] == 0) {
-            number = n->first[k];
-            continue;
-        }
-        const float *share = tree->share + n->first[k];
-        uint32_t i = 0;
-        left = *u;
-        while (i + 1 < n->count[k] && left >= share[i]) left -= share[i++];
-        *u = lx_clamp(left / share[i], 0, 0x1.fffffep-1f);
-        *triangle = tree->order[n->first[k] + i];
-        *probability *= share[i];
-        return *probability > 0;
-    }
+    return descend(tree, root, viewer, u, triangle, probability);
 }
 
 float lx_light_tree_probability(const lx_light_tree *tree, uint32_t triangle, lx_vec3 viewer)
@@ -262,10 +352,59 @@ float lx_light_tree_probability(const lx_light_tree *tree, uint32_t triangle, lx
     float probability = tree->share_of[triangle];
     if (!(probability > 0)) return 0;
     for (uint32_t at = tree->place[triangle]; at != LX_NO_LIGHT_NODE; at = tree->nodes[at / width].parent) {
-        float importance[width];
-        const float total = find_importances(&tree->nodes[at / width], viewer, importance);
+        float importance[width], sums[width];
+        find_importances(&tree->nodes[at / width], viewer, importance);
+        const float total = add_up(importance, sums);
         if (!(importance[at % width] > 0)) return 0;
         probability *= importance[at % width] / total;
     }
     return probability;
+}
+
+float lx_light_tree_sum(const lx_light_tree *tree, const lx_light_roots *roots, lx_vec3 viewer)
+{
+    float sum = 0;
+    for (uint32_t i = 0; i < roots->coarse.count; ++i) {
+        const lx_light_branch *part = &tree->parts[roots->coarse.first + i];
+        float importance[width];
+        find_importances(&tree->nodes[part->node], viewer, importance);
+        for (int k = 0; k < width; ++k) sum += part->keep[k] * importance[k];
+    }
+    return sum;
+}
+
+// ---- tables ----------------------------------------------------------------------------------------------------------------------
+
+bool lx_light_table_fill(lx_light_table *table, const lx_light_tree *tree, const lx_light_roots *roots, const lx_light_view *view)
+{
+    table->parts = tree->parts + roots->fine.first;
+    table->count = roots->fine.count;
+    float sum = 0, close_sum = 0;
+    for (uint32_t i = 0; i < table->count; ++i) {
+        float *importance = table->importance[i], close[width];
+        find_view_importances(&tree->nodes[table->parts[i].node], view, table->parts[i].keep, importance, close);
+        sum += (importance[0] + importance[1]) + (importance[2] + importance[3]);
+        close_sum += (close[0] + close[1]) + (close[2] + close[3]);
+        table->sums[i] = sum;
+    }
+    table->rough = close_sum > most_close * sum;
+    return sum > 0;
+}
+
+bool lx_light_table_sample(const lx_light_table *table, const lx_light_tree *tree, lx_vec3 viewer, float *u, uint32_t *triangle, float *probability)
+{
+    const uint32_t last = table->count - 1;
+    const float total = table->sums[last], at = lx_min(*u * total, total * 0x1.fffffep-1f);
+    uint32_t i = 0;
+    for (uint32_t part = 0; part < last; ++part) i += at >= table->sums[part];
+    float sums[width];
+    const float *importance = table->importance[i], before = i > 0 ? table->sums[i - 1] : 0;
+    const float all = add_up(importance, sums);
+    if (!(all > 0)) return false; // not with sums that rise there
+    *u = lx_clamp((at - before) / all, 0, 0x1.fffffep-1f);
+    const int k = choose_child(importance, sums, u);
+    *probability = importance[k] / total;
+    const lx_light_node *n = &tree->nodes[table->parts[i].node];
+    if (n->count[k] > 0) return choose_in_leaf(tree, n, k, u, triangle, probability);
+    return descend(tree, n->first[k], viewer, u, triangle, probability);
 }

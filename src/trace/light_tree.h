@@ -1,4 +1,5 @@
-/// A tree over the triangles of one emissive source: which of them to sample for a place, with exact probabilities.
+/// A tree over the triangles of one emissive source: which of them to sample for a place, with exact probabilities; and tables of it for many samples
+/// from places close together.
 ///
 /// Based on: [ContyKulla2018] Conty Estevez, Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", HPG 2018, and [PBR4] 12.6.3, with
 /// four children a node (their importances are one loop of four lanes), and several triangles a leaf, chosen by power.
@@ -15,7 +16,7 @@ enum { lx_light_tree_width = 4, lx_light_leaf_size = 8 };
 
 /// Bounds of up to four children: a sphere around their triangles, a cone around their normals, their power. Of empty ones the power is 0.
 typedef struct lx_light_node {
-    float x[lx_light_tree_width], y[lx_light_tree_width], z[lx_light_tree_width], radius2[lx_light_tree_width];
+    float x[lx_light_tree_width], y[lx_light_tree_width], z[lx_light_tree_width], radius[lx_light_tree_width], radius2[lx_light_tree_width];
     float axis_x[lx_light_tree_width], axis_y[lx_light_tree_width], axis_z[lx_light_tree_width];
     float cos_cone[lx_light_tree_width], sin_cone[lx_light_tree_width];
     float both_sides[lx_light_tree_width]; ///< 1: the triangles shine from both.
@@ -33,9 +34,30 @@ typedef struct lx_light_leaf {
     uint32_t triangle; ///< The caller's number of it.
 } lx_light_leaf;
 
+/// A part of a tree: those children of a node whose `keep` is 1 (it is 0 for the others).
+typedef struct lx_light_branch {
+    uint32_t node;
+    float keep[lx_light_tree_width];
+} lx_light_branch;
+
+/// Every triangle lies below one of the parts' children.
+typedef struct lx_light_cut {
+    uint32_t first, count; ///< Into the tree's parts.
+} lx_light_cut;
+
+/// What the trees of a source are entered by.
+typedef struct lx_light_roots {
+    uint32_t root;             ///< LX_NO_LIGHT_NODE: there is no tree.
+    lx_light_cut coarse, fine; ///< At most lx_light_coarse_parts and lx_light_fine_parts.
+} lx_light_roots;
+
+enum { lx_light_coarse_parts = 4, lx_light_fine_parts = 64 };
+
 typedef struct lx_light_tree {
     lx_light_node *nodes;
     size_t node_count, node_capacity;
+    lx_light_branch *parts;
+    size_t part_count, part_capacity;
     // By position in the tree's order.
     uint32_t *order; ///< Triangle there.
     float *share;    ///< Its share of its leaf's power.
@@ -46,7 +68,7 @@ typedef struct lx_light_tree {
 } lx_light_tree;
 
 /// Adds a tree over `leaves` (their order is changed), count > 0, each of power above 0. `place` and `share_of` of their triangles are written.
-lx_result lx_light_tree_add(lx_light_tree *tree, lx_light_leaf *leaves, uint32_t count, uint32_t *out_root, lx_error *error);
+lx_result lx_light_tree_add(lx_light_tree *tree, lx_light_leaf *leaves, uint32_t count, lx_light_roots *out_roots, lx_error *error);
 void lx_light_tree_release(lx_light_tree *tree);
 
 /// Chooses a triangle for what lies at `viewer`; u becomes its place within the choice. False: none shines there (or so little is certain that
@@ -54,5 +76,29 @@ void lx_light_tree_release(lx_light_tree *tree);
 bool lx_light_tree_sample(const lx_light_tree *tree, uint32_t root, lx_vec3 viewer, float *u, uint32_t *triangle, float *probability);
 /// The probability that lx_light_tree_sample chooses that triangle of its tree.
 float lx_light_tree_probability(const lx_light_tree *tree, uint32_t triangle, lx_vec3 viewer);
+
+/// About what all triangles together send to `viewer`: sum of power × cosine at the emitter / d², cluster by cluster; too much rather than too little.
+float lx_light_tree_sum(const lx_light_tree *tree, const lx_light_roots *roots, lx_vec3 viewer);
+
+/// Receivers close together.
+typedef struct lx_light_view {
+    lx_vec3 centre, normal; ///< Mean normal (of the cosine), unit.
+    float radius;           ///< Of the sphere around all of them.
+    float spread;           ///< Normals differ from the mean by vectors of at most this length.
+} lx_light_view;
+
+/// Importances of the fine cut for all receivers of a view, their cosine included: most of a descent, done once.
+typedef struct lx_light_table {
+    uint32_t count;
+    float sums[lx_light_fine_parts]; ///< Running.
+    float importance[lx_light_fine_parts][lx_light_tree_width];
+    const lx_light_branch *parts;
+    bool rough; ///< Receivers see the source so differently that each had better ask the tree.
+} lx_light_table;
+
+/// False: certainly nothing shines on any receiver of the view.
+bool lx_light_table_fill(lx_light_table *table, const lx_light_tree *tree, const lx_light_roots *roots, const lx_light_view *view);
+/// As lx_light_tree_sample, for a `viewer` of the view; what the table does not decide is up to the tree.
+bool lx_light_table_sample(const lx_light_table *table, const lx_light_tree *tree, lx_vec3 viewer, float *u, uint32_t *triangle, float *probability);
 
 #endif

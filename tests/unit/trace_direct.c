@@ -8,13 +8,15 @@ enum { edge = 10, luxels = edge * edge, samples = 64, brute_samples = 16 * 200, 
 
 // Two squares, one of them with texture coordinates (a monitor needs them); a lamp of every kind above or beside the tile.
 static const char members[] =
-    "'bufferViews':[{'buffer':0,'byteLength':48},{'buffer':0,'byteOffset':48,'byteLength':32},{'buffer':0,'byteOffset':80,'byteLength':12}],"
+    "'bufferViews':[{'buffer':0,'byteLength':48},{'buffer':0,'byteOffset':48,'byteLength':32},{'buffer':0,'byteOffset':80,'byteLength':60}],"
     "'accessors':[{'bufferView':0,'componentType':5126,'count':4,'type':'VEC3'},{'bufferView':1,'componentType':5126,'count':4,'type':'VEC2'},"
-    "{'bufferView':2,'componentType':5123,'count':6,'type':'SCALAR'}],"
+    "{'bufferView':2,'componentType':5123,'count':6,'type':'SCALAR'},"
+    "{'bufferView':2,'componentType':5123,'count':30,'type':'SCALAR'}],"
     "'meshes':[{'primitives':[{'attributes':{'POSITION':0},'indices':2,'material':0}]},"
     "{'primitives':[{'attributes':{'POSITION':0,'TEXCOORD_0':1},'indices':2,'material':1}]},"
     "{'primitives':[{'attributes':{'POSITION':0,'TEXCOORD_0':1},'indices':2,'material':2}]},"
-    "{'primitives':[{'attributes':{'POSITION':0},'indices':2,'material':3}]}],"
+    "{'primitives':[{'attributes':{'POSITION':0},'indices':2,'material':3}]},"
+    "{'primitives':[{'attributes':{'POSITION':0},'indices':3,'material':1}]}],"
     "'materials':[{'doubleSided':true},{'emissiveFactor':[1,1,1]},{'emissiveFactor':[1,1,1],'extras':{'luxel_monitor':'3x2'}},"
     "{'alphaMode':'BLEND','doubleSided':true,'pbrMetallicRoughness':{'baseColorFactor':[1,1,1,0.25]}}],"
     "'extensionsUsed':['KHR_lights_punctual'],'extensions':{'KHR_lights_punctual':{'lights':[{'type':'point'},{'type':'directional'}]}},"
@@ -26,6 +28,7 @@ static const char members[] =
     "{'name':'panel','translation':[0,2,0],'rotation':[-0.70710678,0,0,0.70710678],'extras':{'luxel_area':'rect 1 0.5'}},"
     "{'name':'dish','translation':[0,1.5,0],'rotation':[-0.70710678,0,0,0.70710678],'extras':{'luxel_area':'disk 0.4'}},"
     "{'name':'glow','mesh':1,'rotation':[0.70710678,0,0,0.70710678],'translation':[0,2.5,0],'scale':[0.5,0.25,1]},"
+    "{'name':'swarm','mesh':4,'rotation':[0.70710678,0,0,0.70710678],'translation':[0.2,2.1,0],'scale':[0.08,0.08,1]},"
     "{'name':'screen','mesh':2,'rotation':[0,0.70710678,0,0.70710678],'translation':[-2,1,0]},"
     "{'name':'below','translation':[0,-1,0],'extensions':{'KHR_lights_punctual':{'light':0}}}]";
 
@@ -44,7 +47,7 @@ static void begin(fixture *f, uint32_t seed)
     bin_clear();
     BIN_FLOATS(-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0);
     BIN_FLOATS(0, 1, 1, 1, 1, 0, 0, 0);
-    BIN_U16(0, 1, 2, 0, 2, 3);
+    for (int k = 0; k < 5; ++k) BIN_U16(0, 1, 2, 0, 2, 3);
     *f = (fixture){.scene = import_members(members)};
     bool *cells = calloc(f->scene->source_count, sizeof *cells);
     for (uint32_t i = 0; i < f->scene->source_count; ++i) cells[i] = f->scene->sources[i].columns > 0;
@@ -134,6 +137,8 @@ static void suns_give_what_brute_force_does(void **state) { (void)state; check_s
 static void rectangles_give_what_brute_force_does(void **state) { (void)state; check_source("panel"); }
 static void disks_give_what_brute_force_does(void **state) { (void)state; check_source("dish"); }
 static void emissive_surfaces_give_what_brute_force_does(void **state) { (void)state; check_source("glow"); }
+// Ten triangles, in a tree: some luxels see them as small, some don't.
+static void emissive_meshes_give_what_brute_force_does(void **state) { (void)state; check_source("swarm"); }
 static void cells_of_monitors_give_what_brute_force_does(void **state) { (void)state; check_source("screen"); }
 
 static void source_below_the_horizon_gives_nothing_without_a_ray(void **state)
@@ -153,7 +158,7 @@ static void source_below_the_horizon_gives_nothing_without_a_ray(void **state)
 static void rays_are_spared_where_neighbours_agree(void **state)
 {
     (void)state;
-    static const char *const names[] = {"bulb", "globe", "sun", "panel", "dish", "glow"};
+    static const char *const names[] = {"bulb", "globe", "sun", "panel", "dish", "glow", "swarm"};
     fixture f;
     begin(&f, 1);
     for (size_t k = 0; k < sizeof names / sizeof *names; ++k) {
@@ -239,6 +244,7 @@ int main(void)
         cmocka_unit_test(rectangles_give_what_brute_force_does),
         cmocka_unit_test(disks_give_what_brute_force_does),
         cmocka_unit_test(emissive_surfaces_give_what_brute_force_does),
+        cmocka_unit_test(emissive_meshes_give_what_brute_force_does),
         cmocka_unit_test(cells_of_monitors_give_what_brute_force_does),
         cmocka_unit_test(source_below_the_horizon_gives_nothing_without_a_ray),
         cmocka_unit_test(rays_are_spared_where_neighbours_agree),

@@ -17,7 +17,7 @@ enum { viewer_count = sizeof viewers / sizeof *viewers };
 typedef struct tube {
     lx_light_leaf leaves[triangles]; // by triangle
     lx_light_tree tree;
-    uint32_t root;
+    lx_light_roots roots;
 } tube;
 
 static lx_vec3 corner_at(uint32_t i, uint32_t k)
@@ -28,7 +28,7 @@ static lx_vec3 corner_at(uint32_t i, uint32_t k)
 
 static void make_tube(tube *t, bool both_sides)
 {
-    *t = (tube){.root = 0};
+    *t = (tube){.roots = {0}};
     for (uint32_t i = 0, n = 0; i < along; ++i)
         for (uint32_t k = 0; k < around; ++k)
             for (uint32_t half = 0; half < 2; ++half, ++n) {
@@ -47,7 +47,7 @@ static void make_tube(tube *t, bool both_sides)
     t->tree.share_of = calloc(triangles, sizeof *t->tree.share_of);
     static lx_light_leaf shuffled[triangles];
     for (uint32_t n = 0; n < triangles; ++n) shuffled[n] = t->leaves[n];
-    assert_int_equal(lx_light_tree_add(&t->tree, shuffled, triangles, &t->root, NULL), LX_OK);
+    assert_int_equal(lx_light_tree_add(&t->tree, shuffled, triangles, &t->roots, NULL), LX_OK);
 }
 
 // Light of a triangle's centre at the viewer, without the receiver's cosine.
@@ -78,7 +78,7 @@ static void every_triangle_that_shines_can_be_chosen_and_probabilities_add_up(vo
             for (uint32_t i = 0; i < 20000; ++i) {
                 float u = lx_unit_float(lx_hash32(i)), p;
                 uint32_t n;
-                failures += !lx_light_tree_sample(&t.tree, t.root, viewers[v], &u, &n, &p);
+                failures += !lx_light_tree_sample(&t.tree, t.roots.root, viewers[v], &u, &n, &p);
             }
             const double lost = 1 - sum;
             assert_true(fabs(failures / 20000.0 - lost) < 5 * sqrt(fmax(lost, 0) / 20000) + 1e-3);
@@ -100,7 +100,7 @@ static void draws_follow_the_probabilities(void **state)
         for (uint32_t i = 0; i < draws; ++i) {
             float u = lx_unit_float(lx_hash32(i * 2 + 1)), p;
             uint32_t n;
-            if (!lx_light_tree_sample(&t.tree, t.root, viewers[v], &u, &n, &p)) continue;
+            if (!lx_light_tree_sample(&t.tree, t.roots.root, viewers[v], &u, &n, &p)) continue;
             assert_true(u >= 0 && u < 1);
             assert_true(fabsf(p - lx_light_tree_probability(&t.tree, n, viewers[v])) < 1e-5f * p);
             ++counts[n];
@@ -157,11 +157,44 @@ static void variance_near_a_long_tube_is_a_fraction_of_that_by_power(void **stat
     lx_light_tree_release(&t.tree);
 }
 
+// One table for receivers around a place: what each gets by it, over evenly spread draws, is the sum over all triangles.
+static void table_of_a_view_gives_each_receiver_its_light(void **state)
+{
+    (void)state;
+    static tube t;
+    make_tube(&t, false);
+    static lx_light_table table;
+    const lx_light_view view = {.centre = {0.3f, -1.2f, 0.4f}, .normal = {0, 0.8f, -0.6f}, .radius = 0.1f, .spread = 0.05f};
+    assert_true(lx_light_table_fill(&table, &t.tree, &t.roots, &view));
+    assert_false(table.rough);
+    static const lx_vec3 offsets[] = {{0, 0, 0}, {0.09f, 0, 0}, {-0.05f, 0.04f, 0.06f}, {0, -0.06f, -0.07f}};
+    for (size_t r = 0; r < sizeof offsets / sizeof *offsets; ++r) {
+        const lx_vec3 viewer = lx_add(view.centre, offsets[r]);
+        double expected = 0, got = 0;
+        for (uint32_t n = 0; n < triangles; ++n) expected += light_of(&t.leaves[n], viewer);
+        for (uint32_t i = 0; i < draws; ++i) {
+            float u = ((float)i + 0.5f) / draws, p;
+            uint32_t n;
+            if (!lx_light_table_sample(&table, &t.tree, viewer, &u, &n, &p)) continue;
+            assert_true(u >= 0 && u < 1 && p > 0 && p <= 1);
+            got += light_of(&t.leaves[n], viewer) / (double)p / draws;
+        }
+        assert_true(fabs(got / expected - 1) < 1e-3); // draws are a stratum of 1 / 200000 each, and there are 960 triangles
+    }
+    // From within a hand's breadth each receiver sees another part of the tube; with its back to it none sees anything.
+    const lx_light_view near = {.centre = {0.3f, -0.2f, 0}, .normal = {0, 1, 0}, .radius = 0.2f, .spread = 0.01f};
+    assert_true(lx_light_table_fill(&table, &t.tree, &t.roots, &near) && table.rough);
+    const lx_light_view back = {.centre = {0.3f, -1.2f, 0.4f}, .normal = {0, -1, 0}, .radius = 0.1f, .spread = 0.01f};
+    assert_false(lx_light_table_fill(&table, &t.tree, &t.roots, &back));
+    lx_light_tree_release(&t.tree);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_triangle_that_shines_can_be_chosen_and_probabilities_add_up),
         cmocka_unit_test(draws_follow_the_probabilities),
+        cmocka_unit_test(table_of_a_view_gives_each_receiver_its_light),
         cmocka_unit_test(variance_near_a_long_tube_is_a_fraction_of_that_by_power),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
