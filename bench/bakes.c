@@ -8,6 +8,8 @@
 // every error follows: the squared error of i against j is p_ii - 2 p_ij + p_jj; and where the referee is noisy, two referees j and k of independent noise
 // give it free of theirs: p_ii - p_ij - p_ik + p_jk.
 //
+// `off_by` is the difference from the last bake as the summary's `noise` estimates it: each texel's grey over the last bake's, but over a hundredth of its mean at least; root mean square.
+//
 // `salt` gives a bake other random numbers at the same places: sites of luxels are drawn from the seed alone, so bakes of one seed and different salts differ by
 // the integrator's noise and by nothing else. The linker's --wrap does that; nothing in the product knows of it.
 #include "bake/bake.h"
@@ -147,6 +149,8 @@ static void apply_setting(entry *e, const char *item)
         d->samples = (uint32_t)strtoul(value, NULL, 10);
     else if (is_setting(item, "noise", &value))
         d->noise = strtof(value, NULL);
+    else if (is_setting(item, "interpolation", &value))
+        d->interpolation = strtof(value, NULL);
     else if (is_setting(item, "bounces", &value))
         d->transport.bounces = strcmp(value, "inf") == 0 ? LX_BOUNCES_INF : (uint32_t)strtoul(value, NULL, 10);
     else if (is_setting(item, "seed", &value))
@@ -295,6 +299,22 @@ static double product(const bench *b, const float *x, const float *y, const floa
     return sum / (3 * (double)count);
 }
 
+static double grey_at(const float *sum, size_t texel)
+{
+    return ((double)sum[3 * texel] + (double)sum[3 * texel + 1] + (double)sum[3 * texel + 2]) / 3;
+}
+
+static double off_by(const bench *b, const float *sum, const float *reference, size_t count)
+{
+    double mean = 0, squares = 0;
+    for (size_t i = 0; i < b->texel_count; ++i) mean += b->counts[i] ? grey_at(reference, i) / (double)count : 0;
+    for (size_t i = 0; i < b->texel_count; ++i) {
+        const double truth = grey_at(reference, i), error = (grey_at(sum, i) - truth) / fmax(truth, 0.01 * mean);
+        if (b->counts[i] && mean > 0) squares += error * error;
+    }
+    return sqrt(squares / (double)count);
+}
+
 static void print(const bench *b)
 {
     size_t count = 0;
@@ -305,7 +325,8 @@ static void print(const bench *b)
         const lx_stage_seconds *t = &e->best.stages;
         double mean = 0;
         for (size_t i = 0; i < 3 * b->texel_count; ++i) mean += b->counts[i / 3] ? (double)e->sum[i] : 0;
-        printf("%s\n  {\"mean\": %.9g", k ? "," : "", mean / (3 * (double)(count ? count : 1)));
+        printf("%s\n  {\"mean\": %.9g, \"off_by\": %.6g", k ? "," : "", mean / (3 * (double)(count ? count : 1)),
+               off_by(b, e->sum, b->entries[b->entry_count - 1].sum, count ? count : 1));
         if (!e->exr)
             printf(", \"seconds\": %.4f, \"mean_seconds\": %.4f, \"layers\": %u, "
                    "\"texels\": %llu, \"invalid\": %llu, \"rays\": %llu, \"noise\": %.6g, \"luxels_s\": %.4f, \"bake_s\": %.4f, \"post_s\": %.4f, "

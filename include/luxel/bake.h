@@ -44,6 +44,8 @@ typedef struct lx_bake_desc {
     uint32_t samples;     ///< Gather rays or paths per texel at most, 1 … 16 M. Error falls with 1/sqrt(n). Default 256.
     float noise;          ///< Gather: a tile of texels is done where each layer's standard error over max(texel, 1 % of the layer's mean), root mean
                           ///< square, is below it. 0: all samples are taken. Default 0.02.
+    float interpolation;  ///< Gather: indirect light is interpolated between texels where that errs by at most this share of it, as distances of what is around
+                          ///< tell. 0: nowhere. Default 0.02.
     double time_s;        ///< Gather: samples are added in rounds until this much time has passed; `samples` and `noise` count too. The result depends on
                           ///< the machine. 0 (default): no limit.
     uint64_t memory_bytes; ///< Gather: layers are baked in groups so that the process stays below it. 0 (default): no limit.

@@ -20,8 +20,8 @@ lx_transport_desc lx_transport_desc_default(void)
 
 lx_bake_desc lx_bake_desc_default(void)
 {
-    lx_bake_desc desc = {.transport = lx_transport_desc_default(), .integrator = LX_INTEGRATOR_GATHER, .samples = 256, .noise = 0.02f, .denoise = LX_DENOISE_BUILTIN,
-                         .max_layers = 64};
+    lx_bake_desc desc = {.transport = lx_transport_desc_default(), .integrator = LX_INTEGRATOR_GATHER, .samples = 256, .noise = 0.02f, .interpolation = 0.02f,
+                         .denoise = LX_DENOISE_BUILTIN, .max_layers = 64};
     desc.transport.bounces = LX_BOUNCES_INF;
     return desc;
 }

@@ -11,6 +11,7 @@
 
 #include "bake/finish.h"
 #include "bake/gather_rays.h"
+#include "bake/interpolation.h"
 #include "bake/memory_plan.h"
 #include "bake/texel_sites.h"
 #include "base/clock.h"
@@ -44,14 +45,16 @@ typedef struct gather_scratch {
     lx_receiver *sites;     // [tile_luxels][lx_site_count]
     lx_gather_start *starts; // [chunk_luxels × rays of a round at most]
     float *sums;            // [2][chunk_luxels][3][row_layers], or [tile_luxels][3][row_layers]
-    float *met;             // [2][chunk_luxels][3][row_layers] what gather rays meet of light sources; NULL: nothing is met
+    float *met;             // the same, of what gather rays meet of light sources; NULL: nothing is met
     lx_rgb *mean;           // [cells][tile_luxels] of one source
     float *variance;
-    uint32_t *found;        // [tile_luxels][most_pass_rays]
+    uint32_t *found;        // [chunk_luxels][most_pass_rays]
+    float *distances;       // likewise
     uint32_t stream[tile_luxels], chart[tile_luxels];
     uint16_t place[tile_luxels];
     uint32_t luxel[tile_luxels]; // of the map
-    uint32_t count;              // valid luxels of the tile
+    uint8_t alone[tile_luxels];  // it sends no gather rays
+    uint32_t count;              // luxels of the tile that are at work
 } gather_scratch;
 
 // What a round knows of a tile.
@@ -77,6 +80,9 @@ typedef struct gather_job {
     float *scales;          // [row_layers]
     float *authored;        // [layer_count] mean channel of c
     lx_rgb *albedo;         // [luxel]
+    float *closeness;       // [luxel] of what is around, 1 / m²; INFINITY: not to be interpolated
+    uint8_t *spacing;       // [luxel] of the knots it is interpolated from; 0: it sends gather rays
+    bool interpolates;
     float *radiosity;       // [luxel][3][row_layers] of all passes so far, times scale
     uint16_t *rows[2];      // [luxel][3][row_layers] what the last pass added, and what the next one will; in the end what gather rays read
     uint32_t pass_rays;
@@ -123,13 +129,13 @@ static uint32_t max_cells(const gather_job *g)
     return most;
 }
 
-// Valid luxels of a tile.
-static void list_luxels(const gather_job *g, const lx_luxel_tile *tile, gather_scratch *s)
+// Valid luxels of a tile, or those of them that send gather rays.
+static void list_luxels(const gather_job *g, const lx_luxel_tile *tile, bool senders, gather_scratch *s)
 {
     const lx_luxel_map *map = &g->job->map.view;
     s->count = 0;
     for (uint32_t i = tile->first; i < tile->first + tile->count; ++i) {
-        if (!map->valid[i]) continue;
+        if (!map->valid[i] || (senders && g->spacing[i] > 0)) continue;
         uint32_t texel;
         const lx_luxel_page *page = lx_job_page(g->job, i, &texel);
         s->luxel[s->count] = i;
@@ -207,36 +213,21 @@ static int compare_extras(const void *a, const void *b)
     return memcmp(&x->weight, &y->weight, sizeof x->weight);
 }
 
-static lx_result light_tile(void *user, size_t task, uint32_t worker, lx_error *error)
+// What a luxel's cosine-weighted rays hit, as interpolation asks: the mean of 1 / distance².
+static float find_closeness(const float *distances, uint32_t count)
 {
-    const gather_job *g = user;
-    const lx_bake_desc *desc = &g->bake->desc;
-    const lx_luxel_tile *tile = &g->job->map.tiles[task];
-    gather_scratch *s = &g->scratch[worker];
-    list_luxels(g, tile, s);
-    for (uint32_t i = 0; i < s->count; ++i) place_sites(g, s, i, 0, lx_site_count, s->sites + (size_t)i * lx_site_count);
-    memset(s->sums, 0, sizeof(float) * g->stride * s->count);
-    lx_direct_bounds bounds;
-    lx_direct_tile direct = {.count = s->count, .place = s->place, .chart = s->chart, .stream = s->stream, .sites = s->sites};
-    lx_direct_find_bounds(&direct, &bounds);
-    direct.bounds = &bounds;
-    const lx_direct_settings settings = {.tracer = g->bake->tracer, .samples = (desc->samples + lx_direct_sites - 1) / lx_direct_sites * lx_direct_sites,
-                                         .noise = desc->noise};
-    const bool bounces = g->settings.bounces > 0;
-    for (uint32_t source = 0; source < g->bake->source_count; ++source) {
-        const lx_source_use *use = &g->uses[source];
-        const bool counts = use->direct && !desc->indirect_only;
-        if (use->layer < 0 || (!counts && !bounces)) continue;
-        if (lx_pool_is_stopping(g->bake->scene->context->pool)) return LX_OK;
-        if (lx_direct_light(s->direct, &settings, &direct, source, s->mean, s->variance)) add_source(g, s, source, counts);
-    }
-    if (!bounces) return LX_OK;
+    float sum = 0;
+    for (uint32_t k = 0; k < count; ++k) sum += 1 / (distances[k] * distances[k]);
+    return sum / (float)count;
+}
 
-    // What the sums hold so far is light × scale; what rays add is 1 / LX_ROW_UNIT of it, for each ray.
-    const float ray_unit = LX_ROW_UNIT / (float)g->pass_rays;
-    for (size_t i = 0; i < g->stride * s->count; ++i) s->sums[i] *= 1 / ray_unit;
-    const lx_gather_settings ray_settings = {.tracer = g->bake->tracer, .lookup = &g->lookup, .uses = g->uses, .scales = g->scales,
-                                             .row_layers = g->row_layers, .bounces = g->settings.bounces, .everything = true, .near_texels = pass_near_texels};
+// The cache's rays of a tile: their hits are recorded; what they bring by themselves is added to the sums, in 1 / LX_ROW_UNIT for each ray, and what they meet at once to
+// the sums of that.
+static lx_result send_pass_rays(const gather_job *g, gather_scratch *s, size_t task, lx_error *error)
+{
+    const lx_gather_settings settings = {.tracer = g->bake->tracer, .lookup = &g->lookup, .uses = g->uses, .scales = g->scales,
+                                         .row_layers = g->row_layers, .bounces = g->settings.bounces, .everything = true, .near_texels = pass_near_texels};
+    lx_gather_extras *extras = &g->extras[task];
     for (uint32_t first = 0; first < s->count; first += chunk_luxels) {
         const uint32_t end = first + chunk_luxels < s->count ? first + chunk_luxels : s->count;
         size_t count = 0;
@@ -244,13 +235,75 @@ static lx_result light_tile(void *user, size_t task, uint32_t worker, lx_error *
             for (uint32_t k = 0; k < g->pass_rays; ++k)
                 s->starts[count++] = (lx_gather_start){.receiver = &s->sites[i * lx_site_count + k % lx_site_count],
                                                        .stream = s->stream[i] ^ cache_stream, .sample = k, .target = i};
-        const lx_gather_output out = {.sums = s->sums, .luxels = s->found, .extras = &g->extras[task]};
-        const lx_result result = lx_gather_trace(s->batch, &ray_settings, s->starts, count, &out, error);
+        const lx_gather_output out = {.sums = s->sums, .met = s->met, .distances = s->distances, .luxels = s->found, .extras = extras};
+        const lx_result result = lx_gather_trace(s->batch, &settings, s->starts, count, &out, error);
         if (result != LX_OK) return result;
-        for (uint32_t i = first; i < end; ++i)
-            memcpy(g->hits + (size_t)s->luxel[i] * g->pass_rays, s->found + (size_t)(i - first) * g->pass_rays, g->pass_rays * sizeof *g->hits);
+        for (uint32_t i = first; i < end; ++i) {
+            const size_t ray = (size_t)(i - first) * g->pass_rays;
+            memcpy(g->hits + (size_t)s->luxel[i] * g->pass_rays, s->found + ray, g->pass_rays * sizeof *g->hits);
+            g->closeness[s->luxel[i]] = find_closeness(s->distances + ray, g->pass_rays);
+        }
     }
-    for (uint32_t i = 0; i < s->count; ++i) {
+    for (size_t k = 0; k < extras->count; ++k) extras->items[k].target = s->luxel[extras->items[k].target];
+    if (extras->count) qsort(extras->items, extras->count, sizeof *extras->items, compare_extras);
+    return LX_OK;
+}
+
+// Which luxels of the tile will send gather rays. Those that won't get all their direct light from samples.
+static void choose_senders(const gather_job *g, gather_scratch *s, const lx_luxel_tile *tile)
+{
+    const lx_luxel_map *map = &g->job->map.view;
+    if (!g->interpolates) return;
+    for (uint32_t i = tile->first; i < tile->first + tile->count; ++i) {
+        uint32_t texel;
+        const lx_luxel_page *page = lx_job_page(g->job, i, &texel);
+        if (!map->valid[i] || !lx_luxel_is_whole(g->bake, page, texel)) g->closeness[i] = INFINITY;
+    }
+    lx_choose_spacing(map, tile, g->closeness, g->bake->desc.interpolation, g->spacing);
+    for (uint32_t i = 0; i < s->count; ++i) s->alone[i] = g->spacing[s->luxel[i]] > 0;
+}
+
+static void light_from_sources(const gather_job *g, gather_scratch *s)
+{
+    const lx_bake_desc *desc = &g->bake->desc;
+    lx_direct_bounds bounds;
+    lx_direct_tile direct = {.count = s->count, .place = s->place, .chart = s->chart, .stream = s->stream, .sites = s->sites, .alone = s->alone};
+    lx_direct_find_bounds(&direct, &bounds);
+    direct.bounds = &bounds;
+    const lx_direct_settings settings = {.tracer = g->bake->tracer, .samples = (desc->samples + lx_direct_sites - 1) / lx_direct_sites * lx_direct_sites,
+                                         .noise = desc->noise};
+    for (uint32_t source = 0; source < g->bake->source_count; ++source) {
+        const lx_source_use *use = &g->uses[source];
+        const bool counts = use->direct && !desc->indirect_only;
+        if (use->layer < 0 || (!counts && g->settings.bounces == 0)) continue;
+        if (lx_pool_is_stopping(g->bake->scene->context->pool)) return;
+        if (lx_direct_light(s->direct, &settings, &direct, source, s->mean, s->variance)) add_source(g, s, source, counts);
+    }
+}
+
+static lx_result light_tile(void *user, size_t task, uint32_t worker, lx_error *error)
+{
+    const gather_job *g = user;
+    const lx_luxel_tile *tile = &g->job->map.tiles[task];
+    gather_scratch *s = &g->scratch[worker];
+    list_luxels(g, tile, false, s);
+    for (uint32_t i = 0; i < s->count; ++i) place_sites(g, s, i, 0, lx_site_count, s->sites + (size_t)i * lx_site_count);
+    const size_t row_values = g->stride * s->count;
+    memset(s->sums, 0, row_values * sizeof *s->sums);
+    memset(s->alone, 0, s->count);
+    const bool bounces = g->settings.bounces > 0;
+    if (bounces) {
+        if (s->met) memset(s->met, 0, row_values * sizeof *s->met);
+        const lx_result result = send_pass_rays(g, s, task, error);
+        if (result != LX_OK) return result;
+        choose_senders(g, s, tile);
+        const float ray_unit = LX_ROW_UNIT / (float)g->pass_rays;
+        for (size_t i = 0; i < s->count; ++i)
+            for (size_t k = g->stride * i; k < g->stride * (i + 1); ++k)
+                s->sums[k] = (s->sums[k] + (s->met && !s->alone[i] ? s->met[k] : 0)) * ray_unit;
+    }
+    light_from_sources(g, s);
+    for (uint32_t i = 0; bounces && i < s->count; ++i) {
         const lx_rgb albedo = mean_albedo(g, s->luxel[i]);
         g->albedo[s->luxel[i]] = albedo;
         const float channel[3] = {albedo.r, albedo.g, albedo.b};
@@ -258,14 +311,10 @@ static lx_result light_tile(void *user, size_t task, uint32_t worker, lx_error *
         uint16_t *row = g->rows[0] + g->stride * s->luxel[i];
         for (size_t c = 0; c < 3; ++c)
             for (size_t l = c * g->row_layers; l < (c + 1) * g->row_layers; ++l) {
-                radiosity[l] = channel[c] * s->sums[g->stride * i + l] * ray_unit;
+                radiosity[l] = channel[c] * s->sums[g->stride * i + l];
                 row[l] = lx_row_encode(radiosity[l]);
             }
     }
-    // From numbers within the tile's list to luxels.
-    lx_gather_extras *extras = &g->extras[task];
-    for (size_t k = 0; k < extras->count; ++k) extras->items[k].target = s->luxel[extras->items[k].target];
-    if (extras->count) qsort(extras->items, extras->count, sizeof *extras->items, compare_extras);
     return LX_OK;
 }
 
@@ -472,7 +521,7 @@ static lx_result gather_tile(void *user, size_t task, uint32_t worker, lx_error 
     const tile_state *state = &g->tiles[task];
     gather_scratch *s = &g->scratch[worker];
     if (state->done) return LX_OK;
-    list_luxels(g, tile, s);
+    list_luxels(g, tile, true, s);
     const uint32_t chunk = chunk_luxels;
     for (uint32_t first = 0; first < s->count; first += chunk) {
         if (lx_pool_is_stopping(g->bake->scene->context->pool)) return LX_OK;
@@ -496,7 +545,7 @@ static lx_result judge_tile(void *user, size_t task, uint32_t worker, lx_error *
     tile_state *state = &g->tiles[task];
     gather_scratch *s = &g->scratch[worker];
     if (state->done) return LX_OK;
-    list_luxels(g, &g->job->map.tiles[task], s);
+    list_luxels(g, &g->job->map.tiles[task], true, s);
     if (g->round_first == 0 && s->count < enough_luxels) return LX_OK;
     bool all = true;
     for (uint32_t l = 0; l < g->layer_count; ++l) {
@@ -507,6 +556,35 @@ static lx_result judge_tile(void *user, size_t task, uint32_t worker, lx_error *
     return LX_OK;
 }
 
+static lx_estimate interpolate(const lx_estimate *of, const lx_knots *knots)
+{
+    lx_estimate e = {{0, 0, 0}, 0};
+    for (uint32_t k = 0; k < knots->count; ++k) {
+        e.mean = lx_rgb_add(e.mean, lx_rgb_scale(of[knots->luxel[k]].mean, knots->weight[k]));
+        e.variance += knots->weight[k] * knots->weight[k] * of[knots->luxel[k]].variance;
+    }
+    return e;
+}
+
+// What the tile's luxels without gather rays have from their knots. The met part of direct light they have from their samples.
+static lx_result interpolate_tile(void *user, size_t task, uint32_t worker, lx_error *error)
+{
+    (void)worker;
+    (void)error;
+    const gather_job *g = user;
+    const lx_luxel_tile *tile = &g->job->map.tiles[task];
+    for (uint32_t spacing = lx_wide_spacing; spacing >= lx_narrow_spacing; spacing /= 2)
+        for (uint32_t i = tile->first; i < tile->first + tile->count; ++i) {
+            lx_knots knots;
+            if (g->spacing[i] != spacing || !lx_find_knots(&g->job->map.view, tile, i, spacing, &knots)) continue;
+            for (uint32_t l = 0; l < g->layer_count; ++l) {
+                lx_estimate *layer = g->indirect + (size_t)l * g->luxel_count;
+                layer[i] = interpolate(layer, &knots);
+            }
+        }
+    return LX_OK;
+}
+
 static void find_layer_means(gather_job *g)
 {
     const lx_luxel_map *map = &g->job->map.view;
@@ -514,7 +592,7 @@ static void find_layer_means(gather_job *g)
         double sum = 0;
         uint32_t count = 0;
         for (uint32_t i = 0; i < map->count; ++i) {
-            if (!map->valid[i]) continue;
+            if (!map->valid[i] || g->spacing[i] > 0) continue;
             const size_t at = (size_t)l * g->luxel_count + i;
             sum += (double)(grey(g->direct[at].mean) + grey(g->indirect[at].mean) + (g->met[l] ? grey(g->met[l][i].mean) : 0));
             ++count;
@@ -587,11 +665,13 @@ static lx_result create_scratch(gather_job *g, uint32_t workers, uint32_t round_
         s->sites = lx_calloc_array((size_t)tile_luxels * lx_site_count, sizeof *s->sites);
         s->starts = lx_malloc_array(chunk_luxels * rays, sizeof *s->starts);
         s->sums = lx_malloc_array(sum_rows, g->stride * sizeof *s->sums);
-        if (g->met_estimates) s->met = lx_malloc_array(2 * (size_t)chunk_luxels, g->stride * sizeof *s->met);
+        if (g->met_estimates) s->met = lx_malloc_array(sum_rows, g->stride * sizeof *s->met);
         s->mean = lx_malloc_array(cells * tile_luxels, sizeof *s->mean);
         s->variance = lx_malloc_array(cells * tile_luxels, sizeof *s->variance);
         s->found = lx_malloc_array((size_t)chunk_luxels * most_pass_rays, sizeof *s->found);
-        if (!s->batch || !s->direct || !s->sites || !s->starts || !s->sums || (g->met_estimates && !s->met) || !s->mean || !s->variance || !s->found)
+        s->distances = lx_malloc_array((size_t)chunk_luxels * most_pass_rays, sizeof *s->distances);
+        if (!s->batch || !s->direct || !s->sites || !s->starts || !s->sums || (g->met_estimates && !s->met) || !s->mean || !s->variance || !s->found ||
+            !s->distances)
             return lx_fail_memory(error, "workers");
     }
     return LX_OK;
@@ -606,12 +686,12 @@ static void release_cache(gather_job *g, uint32_t workers)
         if (s->direct) g->job->ray_count += lx_direct_batch_rays(s->direct);
         lx_gather_batch_destroy(s->batch);
         lx_direct_batch_destroy(s->direct);
-        void *arrays[] = {s->sites, s->starts, s->sums, s->met, s->mean, s->variance, s->found};
+        void *arrays[] = {s->sites, s->starts, s->sums, s->met, s->mean, s->variance, s->found, s->distances};
         for (size_t k = 0; k < sizeof arrays / sizeof *arrays; ++k) lx_free(arrays[k]);
     }
     for (uint32_t t = 0; g->extras && t < g->job->map.tile_count; ++t) lx_free(g->extras[t].items);
     void **arrays[] = {(void **)&g->scratch, (void **)&g->extras, (void **)&g->albedo, (void **)&g->radiosity, (void **)&g->rows[0], (void **)&g->rows[1],
-                       (void **)&g->hits, (void **)&g->met_estimates};
+                       (void **)&g->hits, (void **)&g->met_estimates, (void **)&g->closeness, (void **)&g->spacing};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) {
         lx_free(*arrays[i]);
         *arrays[i] = NULL;
@@ -658,6 +738,8 @@ static lx_result allocate(gather_job *g, lx_error *error)
     g->scales = lx_calloc_array(g->row_layers, sizeof *g->scales);
     g->authored = lx_calloc_array(layers, sizeof *g->authored);
     g->albedo = lx_calloc_array(cached, sizeof *g->albedo);
+    g->closeness = lx_calloc_array(cached, sizeof *g->closeness);
+    g->spacing = lx_calloc_array(luxels, sizeof *g->spacing);
     g->radiosity = lx_calloc_array(cached, g->stride * sizeof *g->radiosity);
     for (int i = 0; i < 2; ++i) g->rows[i] = lx_calloc_array(cached, g->stride * sizeof *g->rows[i]);
     g->hits = lx_malloc_array(cached, g->pass_rays * sizeof *g->hits);
@@ -669,7 +751,7 @@ static lx_result allocate(gather_job *g, lx_error *error)
     g->converged = lx_calloc_array(layers, 1);
     g->tiles = lx_calloc_array(tiles, sizeof *g->tiles);
     g->layer_means = lx_calloc_array(layers, sizeof *g->layer_means);
-    if (!g->scales || !g->authored || !g->albedo || !g->radiosity || !g->rows[0] || !g->rows[1] || !g->hits || !g->extras || !g->direct || !g->indirect ||
+    if (!g->scales || !g->authored || !g->albedo || !g->closeness || !g->spacing || !g->radiosity || !g->rows[0] || !g->rows[1] || !g->hits || !g->extras || !g->direct || !g->indirect ||
         !g->pass_change || !g->pass_energy || !g->converged || !g->tiles || !g->layer_means)
         return lx_fail_memory(error, "layers; --memory bakes them in groups");
     for (size_t t = 0; t < tiles; ++t) {
@@ -752,6 +834,13 @@ static lx_result choose_answers(gather_job *g, lx_error *error)
     return LX_OK;
 }
 
+// A uniform sky has no samples: every luxel's own rays must look for it.
+static bool has_unsampled_sky(const lx_bake *bake)
+{
+    const lx_tracer *tracer = bake->tracer;
+    return tracer->sky.present && !lx_sky_has_samples(&tracer->sky) && bake->uses[tracer->source_count - 1].layer >= 0;
+}
+
 // Bakes layers first … first + count - 1. `uses`: [source_count] room for their uses.
 static lx_result bake_group(lx_bake_job *job, uint32_t first, uint32_t count, lx_source_use *uses, sum_estimate *sums, lx_finish *finish,
                             double deadline, lx_error *error)
@@ -771,6 +860,7 @@ static lx_result bake_group(lx_bake_job *job, uint32_t first, uint32_t count, lx
                     .luxel_count = job->map.view.count, .pass_rays = samples < 128 ? 16 : most_pass_rays};
     g.stride = 3 * (size_t)g.row_layers;
     g.settings.bounces = bounces;
+    g.interpolates = bounces > 0 && bake->desc.interpolation > 0 && !has_unsampled_sky(bake);
     LX_TRY(allocate(&g, error));
     LX_TRY(allocate_met(&g, error));
     find_authored(&g);
@@ -791,6 +881,7 @@ static lx_result bake_group(lx_bake_job *job, uint32_t first, uint32_t count, lx
         g.settings.rows_later = bounces > 1 ? g.rows[1] : NULL;
     }
     LX_TRY(run_rounds(&g, deadline, error));
+    if (g.interpolates) LX_TRY(lx_pool_run(pool, job->map.tile_count, interpolate_tile, &g, "gather", NULL, error));
     job->stages.gather += lx_lap(&stage_start);
     take_met_light(&g);
     add_to_sums(&g);

@@ -251,6 +251,8 @@ static void first_hits(lx_gather_batch *b, const lx_gather_settings *settings, c
     const size_t made = make_rays(b, starts, count);
     lx_trace_closest(settings->tracer, b->rays, b->hits, made);
     b->ray_count += made;
+    for (size_t i = 0; out->distances && i < made; ++i)
+        if (b->hits[i].surface != LX_MISS) out->distances[first_start + b->found[i]] = b->hits[i].t;
     size_t pending_count = 0;
     for (size_t i = 0; i < made; ++i) {
         const lx_hit *hit = &b->hits[i];
@@ -361,8 +363,8 @@ static void add_slow_rows(lx_gather_batch *b, const lx_gather_settings *settings
 // The light of a vertex is but one of a luxel's many rays: roulette skips more of it than the path integrator does.
 static bool sample_light(const lx_gather_settings *settings, uint32_t source, const vertex_record *v, lx_ray *ray, lx_rgb *light, uint32_t *cell)
 {
-    // source_scales are a twentieth of the mean. Bounds are met by few samples: most bring less than an eighth.
-    enum { scale_factor = 1000, bound_excess = 8 };
+    // source_scales are a twentieth of the mean. Few samples come near their bound.
+    enum { scale_factor = 400, bound_excess = 2 };
     const lx_tracer *tracer = settings->tracer;
     const uint32_t key = lx_hash_combine(tracer->source_keys[source], gather_key + v->number);
     const float scale = scale_factor * tracer->source_scales[source];
@@ -501,6 +503,7 @@ lx_result lx_gather_trace(lx_gather_batch *b, const lx_gather_settings *settings
     b->slow_count = 0;
     if (out->luxels)
         for (size_t i = 0; i < count; ++i) out->luxels[i] = LX_NO_LUXEL;
+    for (size_t i = 0; out->distances && i < count; ++i) out->distances[i] = INFINITY;
     for (size_t first = 0; first < count && result == LX_OK; first += batch_size) {
         const size_t n = count - first < batch_size ? count - first : (size_t)batch_size;
         first_hits(b, settings, starts + first, n, (uint32_t)first, out);

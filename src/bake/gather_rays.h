@@ -46,6 +46,7 @@ typedef struct lx_gather_extras {
 typedef struct lx_gather_output {
     float *sums;             ///< [target][3][row_layers], added to.
     float *met;              ///< Likewise, what the first rays themselves meet of light sources. NULL: that goes to `sums` too.
+    float *distances;        ///< [start] to the first hit; INFINITY: none. NULL: not wanted.
     uint32_t *luxels;        ///< Recording (no rows are read): [start] luxel that the first hit may be looked up at, else LX_NO_LUXEL. NULL: rows are added.
     lx_gather_extras *extras; ///< Recording: later hits.
 } lx_gather_output;

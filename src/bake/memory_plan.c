@@ -12,7 +12,7 @@ static const struct {
     uint32_t albedo;
     uint32_t pass_ray;        // and ray of the passes: the luxel it hit,
     uint32_t extra;           // and what paths that went on found, on average
-    uint32_t sum;             // estimate of the sum of all layers
+    uint32_t sum;             // estimate of the sum of all layers, and by what knots it is interpolated
     uint32_t estimate;        // and layer: direct and indirect light
     uint32_t met;             // and layer whose light gather rays meet: a part of its direct light
     uint32_t row;             // and layer, layers padded: radiosity, and what two passes add to it
@@ -23,13 +23,13 @@ static const struct {
     // Per worker:
     uint32_t batches;
     uint32_t worker_row; // and layer, padded: sums of a tile
-    uint32_t worker_met; // and what is met of them, of a half
+    uint32_t worker_met; // and what is met of them
     uint32_t worker_cell; // and cell of the largest monitor: light of a tile
 } cost = {
-    .albedo = sizeof(lx_rgb),
+    .albedo = sizeof(lx_rgb) + sizeof(float),
     .pass_ray = sizeof(uint32_t),
     .extra = 40,
-    .sum = 5 * sizeof(float),
+    .sum = 5 * sizeof(float) + sizeof(uint8_t),
     .estimate = 2 * sizeof(lx_estimate),
     .met = sizeof(lx_estimate),
     .row = 3 * sizeof(float) + 2 * 3 * sizeof(uint16_t),
@@ -37,7 +37,7 @@ static const struct {
     .tile = 2 * sizeof(double) + 1,
     .batches = 4 << 20,
     .worker_row = lx_luxel_tile_edge * lx_luxel_tile_edge * 3 * sizeof(float),
-    .worker_met = lx_luxel_tile_edge * lx_luxel_tile_edge / 2 * 3 * sizeof(float),
+    .worker_met = lx_luxel_tile_edge * lx_luxel_tile_edge * 3 * sizeof(float),
     .worker_cell = lx_luxel_tile_edge * lx_luxel_tile_edge * (sizeof(lx_rgb) + sizeof(float)),
 };
 

@@ -40,6 +40,7 @@ typedef struct bake_options {
     int integrator, denoise; // -1: not given
     uint32_t samples;        // 0: what the quality says
     float noise;             // -1: likewise
+    float interpolation;     // -1: not given
     double time_s;           // 0: not given
     uint64_t memory_bytes;   // likewise
     char *scratch_folder;    // owned
@@ -49,7 +50,7 @@ typedef struct bake_options {
 // What only the gather integrator knows how to do; NULL: nothing of it was asked for.
 static const char *gather_option(const bake_options *o)
 {
-    return o->noise >= 0.0f ? "noise" : o->time_s > 0.0 ? "time" : o->memory_bytes > 0 ? "memory" : o->denoise >= 0 ? "denoise" : NULL;
+    return o->noise >= 0.0f ? "noise" : o->interpolation >= 0.0f ? "interpolation" : o->time_s > 0.0 ? "time" : o->memory_bytes > 0 ? "memory" : o->denoise >= 0 ? "denoise" : NULL;
 }
 
 // Beside the result, where there is room for much if there is room for that; TMPDIR goes before it.
@@ -76,6 +77,7 @@ static int choose_quality(const cli_command *command, bake_options *o)
     if (o->transport.desc.bounces == not_given) o->transport.desc.bounces = paths ? path_bounces : LX_BOUNCES_INF;
     o->bake.samples = o->samples ? o->samples : presets[o->quality].samples;
     o->bake.noise = o->noise >= 0.0f ? o->noise : presets[o->quality].noise;
+    if (o->interpolation >= 0.0f) o->bake.interpolation = o->interpolation;
     o->bake.time_s = o->time_s;
     o->bake.memory_bytes = o->memory_bytes;
     if (o->denoise >= 0) o->bake.denoise = (lx_denoiser)o->denoise;
@@ -113,13 +115,15 @@ static int parse(const cli_command *command, int argc, char **argv, bake_options
          .help = "rays per texel at most; four times as many halve the noise"},
         {.name = "noise", .argument = "E", .kind = CLI_FLOAT, .target = &o->noise, .max = 1,
          .help = "where every layer's error is estimated below that, 0.02 meaning 2 %, no more samples are taken; 0: take them all"},
+        {.name = "interpolation", .argument = "E", .kind = CLI_FLOAT, .target = &o->interpolation, .max = 1,
+         .help = "interpolate indirect light between texels where that errs by at most E, as distances tell; 0: nowhere (default 0.02)"},
         {.name = "time", .argument = "DURATION", .kind = CLI_DURATION, .target = &o->time_s, .max = 1e9,
          .help = "take no new samples once that much time has passed: 90s, 5m, 1h30m. The result then depends on the machine"},
         {.name = "denoise", .argument = "none|builtin|oidn", .kind = CLI_CHOICE, .target = &o->denoise,
          .help = "smooth what noise is left; oidn: by Intel Open Image Denoise, where its library is installed (default builtin)"},
         {.name = "integrator", .argument = "gather|path", .kind = CLI_CHOICE, .target = &o->integrator,
          .help = "how light is followed. gather: fast, one ray serves all layers and bounces; path: every texel by paths of its own, slow and "
-                 "free of bias, for reference; it knows no --noise, --time, --denoise and --memory (default "
+                 "free of bias, for reference; it knows no --noise, --interpolation, --time, --denoise and --memory (default "
                  "gather)"},
         {.kind = CLI_HEADING, .help = "Light"},
         CLI_TRANSPORT_OPTIONS(o->transport, "inf; with --integrator path 8"),
@@ -284,7 +288,7 @@ static int run(const cli_command *command, int argc, char **argv)
     bake_options o = {.session = cli_session_default(), .transport = cli_transport_default(),
                       .load = lx_scene_load_desc_default(), .atlas = lx_atlas_desc_default(),
                       .bake = lx_bake_desc_default(), .save = lx_save_desc_default(),
-                      .quality = quality_medium, .integrator = -1, .denoise = -1, .noise = -1.0f};
+                      .quality = quality_medium, .integrator = -1, .denoise = -1, .noise = -1.0f, .interpolation = -1.0f};
     o.transport.desc.bounces = not_given;
     int status = parse(command, argc, argv, &o);
     if (status != CLI_GO_ON) {

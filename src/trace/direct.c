@@ -197,10 +197,11 @@ static bool take_sample(job *j, uint32_t luxel, uint32_t i, lx_ray *ray, lx_rgb 
     if (lx_source_bound(j->tracer, j->source, site) == 0) return false;
     j->b->luxels[luxel].possible = true;
     const lx_vec2 u = lx_sobol_pair(i, lx_hash_combine(j->tile->stream[luxel], j->key));
-    if (!j->has_views || i < probes) return lx_sample_source(j->tracer, j->source, site, u, j->weight, ray, light, cell);
+    const uint32_t weight = j->tile->alone && j->tile->alone[luxel] ? 0 : j->weight;
+    if (!j->has_views || i < probes) return lx_sample_source(j->tracer, j->source, site, u, weight, ray, light, cell);
     if (j->viewed != luxel) lx_source_view_fill(&j->b->view, j->tracer, j->source, sites, lx_direct_sites);
     j->viewed = luxel;
-    return lx_source_view_sample(&j->b->view, i % lx_direct_sites, u, j->weight, ray, light, cell);
+    return lx_source_view_sample(&j->b->view, i % lx_direct_sites, u, weight, ray, light, cell);
 }
 
 static void trace_rays(const job *j, size_t count)

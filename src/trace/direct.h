@@ -25,6 +25,7 @@ typedef struct lx_direct_tile {
     const uint32_t *chart;      ///< [count] only luxels of one chart are neighbours.
     const uint32_t *stream;     ///< [count] key of the luxel's random numbers.
     const lx_receiver *sites;   ///< [count][lx_direct_sites]
+    const uint8_t *alone;       ///< [count] true: no gather rays leave the luxel, samples bring all light. NULL: they leave all.
     const lx_direct_bounds *bounds; ///< Of the sites, once for all sources; NULL: no source is left out at once.
 } lx_direct_tile;
 

@@ -196,7 +196,7 @@ static bool sample_emissive(const lx_tracer *tracer, uint32_t source, const lx_s
     if (!t->plain) emission = lx_surface_emission(tracer, t->surface, t->triangle, s.u, s.v);
     if (lx_rgb_is_black(emission)) return false;
     const float pdf = s.pdf_area * distance2 / emitter_cosine; // solid angle
-    const float weight = alone ? 1 : power_heuristic((float)count * pdf, cosine / LX_PI);
+    const float weight = alone || count == 0 ? 1 : power_heuristic((float)count * pdf, cosine / LX_PI);
     *irradiance = lx_rgb_scale(emission, weight * cosine / pdf);
     *ray = ray_to_point(r, lx_offset_origin(point, normal));
     *cell = lx_tracer_cell_at(tracer, t->surface, t->triangle, s.u, s.v);
@@ -221,17 +221,18 @@ float lx_source_bound(const lx_tracer *tracer, uint32_t source, const lx_receive
         if (light->kind == LX_LIGHT_SPOT && facing < s->cos_outer * distance) return 0;
         if ((light->kind == LX_LIGHT_RECT || light->kind == LX_LIGHT_DISK) && !(facing > 0)) return 0;
     }
-    return s->power / (nearest * nearest);
+    const float cosine = lx_min(1, (along + s->radius) / nearest); // of no place on the sphere is it larger
+    return s->power * cosine / (nearest * nearest);
 }
 
-static bool sample_sky(const lx_tracer *tracer, const lx_receiver *r, lx_vec2 u, lx_ray *ray, lx_rgb *irradiance)
+static bool sample_sky(const lx_tracer *tracer, const lx_receiver *r, lx_vec2 u, uint32_t count, lx_ray *ray, lx_rgb *irradiance)
 {
     if (!lx_sky_has_samples(&tracer->sky)) return false;
     float pdf;
     const lx_vec3 direction = lx_sky_sample(&tracer->sky, u, &pdf);
     const float cosine = receiver_cosine(r, direction);
     if (!(pdf > 0) || cosine == 0) return false;
-    const float weight = power_heuristic(pdf, cosine / LX_PI);
+    const float weight = count == 0 ? 1 : power_heuristic(pdf, cosine / LX_PI);
     *irradiance = lx_rgb_scale(lx_sky_radiance(&tracer->sky, direction), weight * cosine / pdf);
     if (lx_rgb_is_black(*irradiance)) return false;
     *ray = ray_to_infinity(r, direction);
@@ -243,7 +244,7 @@ static bool sample_source(const lx_tracer *tracer, uint32_t source, const lx_sou
 {
     *out_cell = 0;
     const lx_source *s = lx_tracer_source(tracer, source);
-    if (s->kind == LX_SOURCE_SKY) return sample_sky(tracer, receiver, u, out_ray, out_irradiance);
+    if (s->kind == LX_SOURCE_SKY) return sample_sky(tracer, receiver, u, count, out_ray, out_irradiance);
     if (s->kind == LX_SOURCE_EMISSIVE) return sample_emissive(tracer, source, view, receiver, u, count, out_ray, out_irradiance, out_cell);
     const lx_light *light = &tracer->scene->lights[s->light];
     float irradiance = 0;

@@ -15,7 +15,7 @@ typedef struct lx_receiver {
 /// One sample of the irradiance that source `source` (of strength 1 and white colour) would give without occluders, and the shadow ray
 /// that decides. Range, spot cone, receiver's cosine, 1/pdf and, for sources that rays can hit (emissive surfaces, pictures of
 /// skies), the power-heuristic weight against cosine-weighted rays are in it; `count`: how many such samples share the work against one ray
-/// (the caller averages them). `out_cell`: of the sampled point, see lx_tracer_cell_at. False: nothing arrives, no ray.
+/// (the caller averages them); 0: no ray meets the source, samples bring all its light (uniform skies have no samples). `out_cell`: of the sampled point, see lx_tracer_cell_at. False: nothing arrives, no ray.
 bool lx_sample_source(const lx_tracer *tracer, uint32_t source, const lx_receiver *receiver, lx_vec2 u, uint32_t count, lx_ray *out_ray,
                       lx_rgb *out_irradiance, uint32_t *out_cell);
 
