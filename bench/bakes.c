@@ -3,7 +3,7 @@
 //     bench_bakes SCENE [OPTION=VALUE...] BAKE...
 //
 // A BAKE is `bake:SETTING=VALUE,...` or `exr:PATH[,scale=X]` (a picture of the atlas that another program baked). What is compared is the sum of all
-// layers at their authored colours, over the texels that count: covered, valid in all of them, and inside their charts by one texel. Printed as JSON: per
+// layers at their authored colours, over the texels that count: covered, valid in all of them, and inside their charts by one texel (`borders=1`: or not). Printed as JSON: per
 // bake the best seconds of `repeat` rounds and the mean; and `products`, the matrix of mean (X_i - X_0)(X_j - X_0) over texels and channels, from which
 // every error follows: the squared error of i against j is p_ii - 2 p_ij + p_jj; and where the referee is noisy, two referees j and k of independent noise
 // give it free of theirs: p_ii - p_ij - p_ik + p_jk.
@@ -48,6 +48,7 @@ typedef struct bench {
     const char *save; // prefix of EXR files of the sums; NULL: none
     size_t texel_count;
     uint8_t *counts;  // [texel] it is compared
+    bool borders;     // compare all valid texels
 } bench;
 
 // ---- what the linker puts between ------------------------------------------------------------------------------------------
@@ -206,7 +207,7 @@ static void add_layers(const bench *b, const lx_bake *bake, float *sum)
     lx_free(image);
 }
 
-// Covered, valid, and so are its eight neighbours, all of the same chart.
+// Covered, valid, and (unless borders count as well) so are its eight neighbours, all of the same chart.
 static void mark_interior(const bench *b, const lx_bake *bake, const uint8_t *valid, uint8_t *counts)
 {
     const int64_t size = b->atlas->page_size;
@@ -215,6 +216,10 @@ static void mark_interior(const bench *b, const lx_bake *bake, const uint8_t *va
             for (int64_t x = 0; x < size; ++x) {
                 const int64_t i = (page * size + y) * size + x;
                 bool inside = x > 0 && y > 0 && x < size - 1 && y < size - 1;
+                if (b->borders) {
+                    counts[i] &= bake->texel_coverage[i] && valid[i];
+                    continue;
+                }
                 for (int64_t k = 0; inside && k < 9; ++k) {
                     const int64_t j = i + (k / 3 - 1) * size + k % 3 - 1;
                     inside = bake->texel_coverage[j] && valid[j] && bake->texel_chart[j] == bake->texel_chart[i];
@@ -356,7 +361,7 @@ static void silent(void *user, lx_log_level level, const char *message)
 int main(int argc, char **argv)
 {
     if (argc < 3) {
-        fprintf(stderr, "usage: bench_bakes SCENE [page_size=N] [max_pages=N] [threads=N] [sky=R,G,B] [repeat=N] [unwrap=1] [save=PREFIX] "
+        fprintf(stderr, "usage: bench_bakes SCENE [page_size=N] [max_pages=N] [threads=N] [sky=R,G,B] [repeat=N] [unwrap=1] [borders=1] [save=PREFIX] "
                         "bake:SETTING=VALUE,... | exr:PATH[,scale=X]...\n");
         return 2;
     }
@@ -386,6 +391,8 @@ int main(int argc, char **argv)
             context_desc.thread_count = (uint32_t)strtoul(value, NULL, 10);
         else if (is_setting(argv[i], "repeat", &value))
             b->repeat = (uint32_t)strtoul(value, NULL, 10);
+        else if (is_setting(argv[i], "borders", &value))
+            b->borders = atoi(value) != 0;
         else if (is_setting(argv[i], "save", &value))
             b->save = value;
         else if (is_setting(argv[i], "sky", &value)) {

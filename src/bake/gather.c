@@ -69,6 +69,12 @@ typedef struct sum_estimate {
     float difference, squares; // of the halves of the first round: of the sum, and the sum of the layers' squares
 } sum_estimate;
 
+// Squares of differences over the light's, summed over a tile's luxels: between the halves of a round, and between it and as many samples before it; in terms of the
+// variance that either shows of the mean of both.
+typedef struct halving {
+    double within, between;
+} halving;
+
 typedef struct gather_job {
     lx_bake_job *job;
     const lx_bake *bake;
@@ -95,6 +101,8 @@ typedef struct gather_job {
     uint8_t *converged;     // [layer] needs no more passes
     tile_state *tiles;
     float *layer_means;     // [layer_count]
+    halving *halvings;      // [tile][layer_count] of a round as long as all before
+    float *gain;            // [layer_count] variance of gathered light over what halves of rounds show
     sum_estimate *sums;     // [luxel] of all groups
     gather_scratch *scratch; // [worker]
     uint32_t round_first, round_count; // samples of the round
@@ -450,6 +458,11 @@ static size_t make_starts(const gather_job *g, gather_scratch *s, uint32_t first
     return count;
 }
 
+static float grey(lx_rgb c)
+{
+    return (c.r + c.g + c.b) / 3;
+}
+
 // Takes the round's sums of one layer into the estimate of one luxel. Returns how far the halves' means are apart.
 static float take_round(const gather_job *g, const float *a, const float *b, float unit, lx_estimate *e)
 {
@@ -472,27 +485,30 @@ static float take_round(const gather_job *g, const float *a, const float *b, flo
 }
 
 // Takes the round's sums into the estimates of luxels first … end - 1 of the list: layer by layer, as estimates lie in memory.
-static void fold(const gather_job *g, const tile_state *state, const gather_scratch *s, uint32_t first, uint32_t end)
+static void fold(const gather_job *g, const tile_state *state, const gather_scratch *s, size_t task, uint32_t first, uint32_t end)
 {
     for (uint32_t l = 0; l < g->layer_count; ++l) {
         if (state->frozen[l]) continue;
-        const float unit = LX_ROW_UNIT / g->scales[l], authored = g->authored[l];
+        const float unit = LX_ROW_UNIT / g->scales[l], authored = g->authored[l], least = darkest * g->layer_means[l];
+        const lx_estimate *direct = g->direct + (size_t)l * g->luxel_count;
+        halving *halvings = &g->halvings[(size_t)task * g->layer_count + l];
         lx_estimate *indirect = g->indirect + (size_t)l * g->luxel_count, *met = g->met[l];
         for (uint32_t i = first; i < end; ++i) {
             const size_t a = g->stride * (i - first) + l, b = a + g->stride * chunk_luxels;
             const uint32_t luxel = s->luxel[i];
+            const lx_rgb before = indirect[luxel].mean;
             const float difference = take_round(g, s->sums + a, s->sums + b, unit, &indirect[luxel]);
             if (met) take_round(g, s->met + a, s->met + b, unit, &met[luxel]);
+            if (g->round_first == g->round_count) { // all samples before against as many: the mean moved half way from the ones to the others
+                const float moved = grey(indirect[luxel].mean) - grey(before), value = lx_max(grey(direct[luxel].mean) + grey(indirect[luxel].mean), least);
+                halvings->within += value > 0 ? (double)(difference * difference / 4) / ((double)value * (double)value) : 0;
+                halvings->between += value > 0 ? (double)(moved * moved) / ((double)value * (double)value) : 0;
+            }
             if (g->round_first > 0) continue;
             g->sums[luxel].difference += difference * authored;
             g->sums[luxel].squares += difference * difference * authored * authored;
         }
     }
-}
-
-static float grey(lx_rgb c)
-{
-    return (c.r + c.g + c.b) / 3;
 }
 
 // Root mean square over the tile's luxels of a layer's standard error over its light.
@@ -503,10 +519,10 @@ static double tile_error(const gather_job *g, const gather_scratch *s, uint32_t 
     const float least = darkest * g->layer_means[layer];
     for (uint32_t i = 0; i < s->count; ++i) {
         const lx_estimate *d = &direct[s->luxel[i]], *e = &indirect[s->luxel[i]];
-        float value = grey(d->mean) + grey(e->mean), variance = d->variance + e->variance;
+        float value = grey(d->mean) + grey(e->mean), variance = d->variance + e->variance * g->gain[layer];
         if (g->met[layer]) {
             value += grey(g->met[layer][s->luxel[i]].mean);
-            variance += g->met[layer][s->luxel[i]].variance;
+            variance += g->met[layer][s->luxel[i]].variance * g->gain[layer];
         }
         value = lx_max(value, least);
         if (variance > 0) sum += (double)variance / ((double)value * (double)value);
@@ -532,7 +548,7 @@ static lx_result gather_tile(void *user, size_t task, uint32_t worker, lx_error 
         const lx_gather_output out = {.sums = s->sums, .met = s->met};
         const lx_result result = lx_gather_trace(s->batch, &g->settings, s->starts, count, &out, error);
         if (result != LX_OK) return result;
-        fold(g, state, s, first, end);
+        fold(g, state, s, task, first, end);
     }
     return LX_OK;
 }
@@ -601,6 +617,35 @@ static void find_layer_means(gather_job *g)
     }
 }
 
+// Variance of a mean falls faster with the number of samples than by its inverse, since a Sobol sequence fills its gaps: the two halves of n samples err in opposite
+// ways, and the variance d(n) that their difference shows (a quarter of its square) is more than the mean's, V(n). What d falls by from n to 2n tells how much more: for halves that
+// are each as good as the other, V(n) = d(2n) + V(2n) = d(2n) + d(4n) + …, or d(n) q / (1 - q) if each is q times the one before. Rounds were added up as if q were 1/2.
+static void find_gains(gather_job *g)
+{
+    static const double least_q = 0.25;
+    const uint32_t tiles = g->job->map.tile_count;
+    for (uint32_t l = 0; l < g->layer_count; ++l) {
+        double within = 0, between = 0;
+        for (uint32_t t = 0; t < tiles; ++t) {
+            const halving *h = &g->halvings[(size_t)t * g->layer_count + l];
+            within += h->within;
+            between += h->between;
+        }
+        const double q = within > 0 ? fmin(fmax(between / within, least_q), 0.5) : 0.5;
+        g->gain[l] = (float)(2 * q * q / (1 - q));
+    }
+    memset(g->halvings, 0, (size_t)tiles * g->layer_count * sizeof *g->halvings);
+}
+
+static void apply_gains(const gather_job *g)
+{
+    for (uint32_t l = 0; l < g->layer_count; ++l)
+        for (uint32_t i = 0; i < g->luxel_count; ++i) {
+            g->indirect[(size_t)l * g->luxel_count + i].variance *= g->gain[l];
+            if (g->met[l]) g->met[l][i].variance *= g->gain[l];
+        }
+}
+
 // Rounds that would end after `deadline` (lx_seconds) are not begun.
 static lx_result run_rounds(gather_job *g, double deadline, lx_error *error)
 {
@@ -620,6 +665,7 @@ static lx_result run_rounds(gather_job *g, double deadline, lx_error *error)
         LX_TRY(lx_pool_run_weighted(pool, job->map.tile_count, job->tile_weights, gather_tile, g, "gather", &sink, error));
         done += g->round_count;
         if (g->round_first == 0) find_layer_means(g);
+        if (g->round_first == g->round_count) find_gains(g);
         if (desc->noise > 0) LX_TRY(lx_pool_run(pool, job->map.tile_count, judge_tile, g, "gather", NULL, error));
         const uint32_t upcoming = done < largest_round ? done : largest_round;
         const double now = lx_seconds(), next = (now - round_start) * (double)upcoming / (double)g->round_count;
@@ -704,7 +750,8 @@ static void release(gather_job *g)
     for (uint32_t t = 0; g->tiles && t < g->job->map.tile_count; ++t) {
         lx_free(g->tiles[t].frozen);
     }
-    void *arrays[] = {g->met, g->scales, g->authored, g->direct, g->indirect, g->pass_change, g->pass_energy, g->converged, g->tiles, g->layer_means};
+    void *arrays[] = {g->met, g->scales, g->authored, g->direct, g->indirect, g->pass_change, g->pass_energy, g->converged, g->tiles, g->layer_means,
+                      g->halvings, g->gain};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) lx_free(arrays[i]);
 }
 
@@ -751,9 +798,12 @@ static lx_result allocate(gather_job *g, lx_error *error)
     g->converged = lx_calloc_array(layers, 1);
     g->tiles = lx_calloc_array(tiles, sizeof *g->tiles);
     g->layer_means = lx_calloc_array(layers, sizeof *g->layer_means);
+    g->halvings = lx_calloc_array(tiles, layers * sizeof *g->halvings);
+    g->gain = lx_malloc_array(layers, sizeof *g->gain);
     if (!g->scales || !g->authored || !g->albedo || !g->closeness || !g->spacing || !g->radiosity || !g->rows[0] || !g->rows[1] || !g->hits || !g->extras || !g->direct || !g->indirect ||
-        !g->pass_change || !g->pass_energy || !g->converged || !g->tiles || !g->layer_means)
+        !g->pass_change || !g->pass_energy || !g->converged || !g->tiles || !g->layer_means || !g->halvings || !g->gain)
         return lx_fail_memory(error, "layers; --memory bakes them in groups");
+    for (size_t l = 0; l < layers; ++l) g->gain[l] = 1;
     for (size_t t = 0; t < tiles; ++t) {
         g->tiles[t].frozen = lx_calloc_array(layers, 1);
         if (!g->tiles[t].frozen) return lx_fail_memory(error, "layers");
@@ -883,6 +933,7 @@ static lx_result bake_group(lx_bake_job *job, uint32_t first, uint32_t count, lx
     LX_TRY(run_rounds(&g, deadline, error));
     if (g.interpolates) LX_TRY(lx_pool_run(pool, job->map.tile_count, interpolate_tile, &g, "gather", NULL, error));
     job->stages.gather += lx_lap(&stage_start);
+    apply_gains(&g);
     take_met_light(&g);
     add_to_sums(&g);
     release_cache(&g, workers);

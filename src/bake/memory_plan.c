@@ -34,7 +34,7 @@ static const struct {
     .met = sizeof(lx_estimate),
     .row = 3 * sizeof(float) + 2 * 3 * sizeof(uint16_t),
     .place = 2 * sizeof(uint32_t),
-    .tile = 2 * sizeof(double) + 1,
+    .tile = 4 * sizeof(double) + 1,
     .batches = 4 << 20,
     .worker_row = lx_luxel_tile_edge * lx_luxel_tile_edge * 3 * sizeof(float),
     .worker_met = lx_luxel_tile_edge * lx_luxel_tile_edge * 3 * sizeof(float),

@@ -11,7 +11,8 @@
 // Where `noise` is given, the number of samples grows fourfold at a time, and a luxel that is sure enough of its light needs no more; where the source gives
 // next to nothing, little is enough.
 //
-// A luxel's samples are cut into four runs. Each is a well-spread set in itself, so what they disagree by tells the variance of their mean.
+// A luxel's samples are cut into four runs. Each is a well-spread set in itself, and what they disagree by tells the variance of their mean; but together they are spread still
+// better, so it tells too much. How much is seen from pairs of runs that disagree less than runs do, over all luxels of the tile (see gain_of).
 #include "trace/direct.h"
 
 #include "base/memory.h"
@@ -75,6 +76,12 @@ struct lx_direct_batch {
     float (*run_sums)[runs]; // mean of the channels
 };
 
+// How far runs are apart within their pairs, and the pairs from each other; squares over the light's, in terms of the variance either shows of the mean of both.
+typedef struct spread {
+    double within, between;
+    uint32_t count;
+} spread;
+
 // What stays the same for one source in one tile.
 typedef struct job {
     lx_direct_batch *b;
@@ -85,6 +92,7 @@ typedef struct job {
     uint32_t first_samples; // of which so many come first, then four times as many, and so on
     bool has_views;
     uint32_t viewed; // luxel that the view is of; most_luxels: none yet
+    spread even, shadowed; // of luxels whose shadows are known, and of others
     float noise, least; // standard error wanted, of the light or of `least`
 } job;
 
@@ -360,13 +368,37 @@ static float variance_of_mean(const float sums[runs], float scale)
     return squares * scale * scale / (runs * (runs - 1));
 }
 
-static void store(const job *j, uint32_t luxel, uint32_t slot, uint32_t samples, lx_rgb factor, lx_rgb *mean, float *variance)
+static void add_spread(spread *to, const float sums[runs])
+{
+    const double a = (double)sums[0] - (double)sums[1], b = (double)sums[2] - (double)sums[3];
+    const double mean = ((double)sums[0] + (double)sums[1] + (double)sums[2] + (double)sums[3]) / runs;
+    const double c = ((double)sums[0] + (double)sums[1] - (double)sums[2] - (double)sums[3]) / 2;
+    if (!(mean > 0) || (a == 0 && b == 0 && c == 0)) return;
+    to->within += (a * a + b * b) / 8 / (mean * mean);
+    to->between += c * c / 4 / (mean * mean);
+    ++to->count;
+}
+
+// Variance of a mean over what the disagreement of its four runs shows. With d(n) as the variance that the difference of the halves of n samples shows, and V(n) the true one,
+// V(n) = d(2n) + V(2n) = d(2n) + d(4n) + …, where each d is q times the one before: d(n) q / (1 - q). Four runs show (d(n / 2) + d(n)) / 3. Plain random numbers have q = 1/2.
+static float gain_of(const spread *s)
+{
+    static const double least_q = 0.25;
+    enum { doubts = 8 }; // as many luxels of plain random numbers are put beside the tile's
+    if (!(s->within > 0)) return 1;
+    const double usual = s->within / s->count, q = fmin(fmax((s->between + 0.5 * doubts * usual) / (s->within + doubts * usual), least_q), 0.5);
+    return (float)(3 * q * q / (1 - q * q));
+}
+
+static void store(job *j, spread *of, uint32_t luxel, uint32_t slot, uint32_t samples, lx_rgb factor, lx_rgb *mean, float *variance)
 {
     const float grey = (factor.r + factor.g + factor.b) * (1.0f / 3);
     for (uint32_t cell = 0; cell < j->cells; ++cell) {
         const size_t at = (size_t)cell * j->tile->count + luxel;
         mean[at] = lx_rgb_mul(lx_rgb_scale(j->b->sums[slot * j->cells + cell], 1 / (float)samples), factor);
-        variance[at] = grey * grey * variance_of_mean(j->b->run_sums[slot * j->cells + cell], runs / (float)samples);
+        const float *sums = j->b->run_sums[slot * j->cells + cell];
+        variance[at] = grey * grey * variance_of_mean(sums, runs / (float)samples);
+        add_spread(of, sums);
     }
 }
 
@@ -410,7 +442,7 @@ static void sum_evenly_lit(job *j, uint32_t luxel, lx_rgb *mean, float *variance
     } else {
         add_unshadowed(j, luxel, 0, samples, samples);
     }
-    store(j, luxel, 0, samples, j->b->luxels[luxel].transmittance, mean, variance);
+    store(j, &j->even, luxel, 0, samples, j->b->luxels[luxel].transmittance, mean, variance);
 }
 
 static void finish_sums(const job *j, size_t count)
@@ -466,7 +498,7 @@ static void sum_shadowed(job *j, const uint16_t *list, uint32_t list_count, lx_r
         for (uint32_t s = 0; s < count; ++s) {
             const uint32_t slot = slots[s];
             if (end == j->samples || is_sure(j, slot, end)) {
-                store(j, list[slot], slot, end, (lx_rgb){1, 1, 1}, mean, variance);
+                store(j, &j->shadowed, list[slot], slot, end, (lx_rgb){1, 1, 1}, mean, variance);
                 continue;
             }
             float *sums = b->run_sums[slot]; // what were four runs is the first of the next four
@@ -518,5 +550,11 @@ bool lx_direct_light(lx_direct_batch *b, const lx_direct_settings *settings, con
     }
     for (uint32_t first = 0; first < count; first += chunk)
         sum_shadowed(&j, b->list + first, count - first < chunk ? count - first : chunk, mean, variance);
+    const float gains[2] = {gain_of(&j.shadowed), gain_of(&j.even)};
+    for (uint32_t i = 0; i < tile->count; ++i) {
+        const luxel_state *s = &b->luxels[i];
+        const float gain = gains[s->verdict == sees_same && !s->doubtful];
+        for (uint32_t cell = 0; cell < j.cells; ++cell) variance[(size_t)cell * tile->count + i] *= gain;
+    }
     return any || count > 0;
 }
