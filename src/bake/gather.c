@@ -45,7 +45,7 @@ typedef struct gather_scratch {
     lx_receiver *sites;     // [tile_luxels][lx_site_count]
     lx_gather_start *starts; // [chunk_luxels × rays of a round at most]
     float *sums;            // [2][chunk_luxels][3][row_layers], or [tile_luxels][3][row_layers]
-    float *met;             // the same, of what gather rays meet of light sources; NULL: nothing is met
+    float *met;             // the same, of what rays meet of light sources
     lx_rgb *mean;           // [cells][tile_luxels] of one source
     float *variance;
     uint32_t *found;        // [chunk_luxels][most_pass_rays]
@@ -90,7 +90,9 @@ typedef struct gather_job {
     uint8_t *spacing;       // [luxel] of the knots it is interpolated from; 0: it sends gather rays
     bool interpolates;
     float *radiosity;       // [luxel][3][row_layers] of all passes so far, times scale
-    uint16_t *rows[2];      // [luxel][3][row_layers] what the last pass added, and what the next one will; in the end what gather rays read
+    uint16_t *rows[3];      // [luxel][3][row_layers] what the last pass added, what the next one will, and with a number of bounces what the pass before the last added;
+                            // in the end what gather rays read
+    uint32_t pass;          // passes so far
     uint32_t pass_rays;
     uint32_t *hits;         // [luxel][pass_rays]
     lx_gather_extras *extras; // [tile]; targets are luxels of the tile
@@ -248,7 +250,7 @@ static lx_result send_pass_rays(const gather_job *g, gather_scratch *s, size_t t
         if (result != LX_OK) return result;
         for (uint32_t i = first; i < end; ++i) {
             const size_t ray = (size_t)(i - first) * g->pass_rays;
-            memcpy(g->hits + (size_t)s->luxel[i] * g->pass_rays, s->found + ray, g->pass_rays * sizeof *g->hits);
+            if (settings.bounces > 0) memcpy(g->hits + (size_t)s->luxel[i] * g->pass_rays, s->found + ray, g->pass_rays * sizeof *g->hits);
             g->closeness[s->luxel[i]] = find_closeness(s->distances + ray, g->pass_rays);
         }
     }
@@ -289,6 +291,19 @@ static void light_from_sources(const gather_job *g, gather_scratch *s)
     }
 }
 
+// Irradiance × unit becomes radiosity.
+static void reflect(const gather_job *g, uint32_t luxel, const float *irradiance, float unit, float *radiosity, uint16_t *row)
+{
+    const lx_rgb a = g->albedo[luxel];
+    const float factor[3] = {a.r * unit, a.g * unit, a.b * unit};
+    for (size_t c = 0; c < 3; ++c)
+        for (size_t l = c * g->row_layers; l < (c + 1) * g->row_layers; ++l) {
+            const float value = factor[c] * irradiance[l];
+            if (radiosity) radiosity[l] = value;
+            row[l] = lx_row_encode(value);
+        }
+}
+
 static lx_result light_tile(void *user, size_t task, uint32_t worker, lx_error *error)
 {
     const gather_job *g = user;
@@ -300,40 +315,44 @@ static lx_result light_tile(void *user, size_t task, uint32_t worker, lx_error *
     memset(s->sums, 0, row_values * sizeof *s->sums);
     memset(s->alone, 0, s->count);
     const bool bounces = g->settings.bounces > 0;
-    if (bounces) {
-        if (s->met) memset(s->met, 0, row_values * sizeof *s->met);
+    if (bounces || g->interpolates) { // direct light must know as well
+        memset(s->met, 0, row_values * sizeof *s->met);
         const lx_result result = send_pass_rays(g, s, task, error);
         if (result != LX_OK) return result;
         choose_senders(g, s, tile);
+    }
+    if (bounces) {
         const float ray_unit = LX_ROW_UNIT / (float)g->pass_rays;
+        for (uint32_t i = 0; i < s->count; ++i) {
+            g->albedo[s->luxel[i]] = mean_albedo(g, s->luxel[i]);
+            reflect(g, s->luxel[i], s->sums + g->stride * i, ray_unit, NULL, g->rows[1] + g->stride * s->luxel[i]); // the first pass adds it
+        }
         for (size_t i = 0; i < s->count; ++i)
             for (size_t k = g->stride * i; k < g->stride * (i + 1); ++k)
-                s->sums[k] = (s->sums[k] + (s->met && !s->alone[i] ? s->met[k] : 0)) * ray_unit;
+                s->sums[k] = s->alone[i] ? 0 : s->met[k] * ray_unit;
     }
     light_from_sources(g, s);
     for (uint32_t i = 0; bounces && i < s->count; ++i) {
-        const lx_rgb albedo = mean_albedo(g, s->luxel[i]);
-        g->albedo[s->luxel[i]] = albedo;
-        const float channel[3] = {albedo.r, albedo.g, albedo.b};
-        float *radiosity = g->radiosity + g->stride * s->luxel[i];
-        uint16_t *row = g->rows[0] + g->stride * s->luxel[i];
-        for (size_t c = 0; c < 3; ++c)
-            for (size_t l = c * g->row_layers; l < (c + 1) * g->row_layers; ++l) {
-                radiosity[l] = channel[c] * s->sums[g->stride * i + l];
-                row[l] = lx_row_encode(radiosity[l]);
-            }
+        const size_t row = g->stride * s->luxel[i];
+        reflect(g, s->luxel[i], s->sums + g->stride * i, 1, g->radiosity + row, g->rows[0] + row);
     }
     return LX_OK;
 }
 
 // ---- passes -------------------------------------------------------------------------------------------------------------------------
 
+static bool is_truncated(const gather_job *g)
+{
+    return g->settings.bounces != LX_BOUNCES_INF;
+}
+
 static lx_result pass_tile(void *user, size_t task, uint32_t worker, lx_error *error)
 {
     (void)error;
     const gather_job *g = user;
     const lx_luxel_tile *tile = &g->job->map.tiles[task];
-    const uint16_t *from = g->rows[0];
+    // What recorded paths found behind a near hit is a bounce further: where bounces are counted, of the pass before.
+    const uint16_t *from = g->rows[0], *from_later = is_truncated(g) ? g->rows[2] : g->rows[0];
     float *sums = g->scratch[worker].sums;
     double *change = g->pass_change + task * g->layer_count, *energy = g->pass_energy + task * g->layer_count;
     memset(change, 0, g->layer_count * sizeof *change);
@@ -352,7 +371,7 @@ static lx_result pass_tile(void *user, size_t task, uint32_t worker, lx_error *e
         for (; extra < extras->count && extras->items[extra].target == i; ++extra) {
             const lx_gather_extra *e = &extras->items[extra];
             const float weight[3] = {e->weight.r, e->weight.g, e->weight.b};
-            lx_row_add_scaled(sums, from + g->stride * e->luxel, g->row_layers, weight);
+            lx_row_add_scaled(sums, from_later + g->stride * e->luxel, g->row_layers, weight);
         }
         float *radiosity = g->radiosity + g->stride * i;
         uint16_t *row = g->rows[1] + g->stride * i;
@@ -365,7 +384,8 @@ static lx_result pass_tile(void *user, size_t task, uint32_t worker, lx_error *e
                     row[at] = 0;
                     continue;
                 }
-                const float value = factor[c] * sums[at];
+                float value = factor[c] * sums[at];
+                if (g->pass == 0) value += lx_row_decode_small(row[at]) * LX_ROW_UNIT; // light that those paths found themselves
                 row[at] = lx_row_encode(value);
                 radiosity[at] += value;
                 change[l] += (double)value;
@@ -382,7 +402,7 @@ static lx_result sum_rows(void *user, size_t task, uint32_t worker, lx_error *er
     (void)error;
     const gather_job *g = user;
     const lx_luxel_tile *tile = &g->job->map.tiles[task];
-    const bool truncated = g->bake->desc.transport.bounces != LX_BOUNCES_INF;
+    const bool truncated = is_truncated(g);
     for (size_t i = g->stride * tile->first; i < g->stride * ((size_t)tile->first + tile->count); ++i) {
         const float last = truncated ? lx_row_decode_small(g->rows[0][i]) * LX_ROW_UNIT : 0;
         g->rows[0][i] = lx_row_encode(g->radiosity[i]);
@@ -397,8 +417,8 @@ static lx_result run_passes(gather_job *g, uint32_t wanted, lx_error *error)
     lx_result result = LX_OK;
     lx_bake_job *job = g->job;
     lx_pool *pool = g->bake->scene->context->pool;
-    double *last = lx_calloc_array(g->layer_count, sizeof *last);
-    if (!last) return lx_fail_memory(error, "irradiance cache");
+    double *changes = lx_calloc_array(g->layer_count, sizeof *changes); // of the last pass
+    if (!changes) return lx_fail_memory(error, "irradiance cache");
     memset(g->converged, 0, g->layer_count);
     stage_part part = {.sink = job->progress, .start = lx_seconds()};
     const lx_progress_sink sink = {report_part, &part};
@@ -408,9 +428,11 @@ static lx_result run_passes(gather_job *g, uint32_t wanted, lx_error *error)
         part.from = pass / expected;
         part.share = 1 / (expected + (wanted == LX_BOUNCES_INF)) * (1 - part.from);
         LX_TRY(lx_pool_run_weighted(pool, job->map.tile_count, job->tile_weights, pass_tile, g, "cache", &sink, error));
-        uint16_t *swap = g->rows[0];
+        ++g->pass;
+        uint16_t *last = g->rows[0], *free_rows = is_truncated(g) ? g->rows[2] : last;
         g->rows[0] = g->rows[1];
-        g->rows[1] = swap;
+        g->rows[1] = free_rows;
+        if (is_truncated(g)) g->rows[2] = last;
         if (wanted != LX_BOUNCES_INF) continue;
         bool all = true;
         for (uint32_t l = 0; l < g->layer_count; ++l) {
@@ -421,9 +443,9 @@ static lx_result run_passes(gather_job *g, uint32_t wanted, lx_error *error)
             }
             if (g->converged[l]) continue;
             // Each bounce is about `ratio` of the one before: what is still to come is the rest of a geometric series.
-            const double ratio = last[l] > 0 ? fmin(change / last[l], 0.99) : 0.9;
+            const double ratio = changes[l] > 0 ? fmin(change / changes[l], 0.99) : 0.9;
             if (!(change * ratio / (1 - ratio) > enough_energy * energy)) g->converged[l] = 1;
-            last[l] = change;
+            changes[l] = change;
             all &= g->converged[l] != 0;
         }
         if (all) break;
@@ -432,7 +454,7 @@ static lx_result run_passes(gather_job *g, uint32_t wanted, lx_error *error)
     part.share = 0;
     LX_TRY(lx_pool_run(pool, job->map.tile_count, sum_rows, g, "cache", &sink, error));
 cleanup:
-    lx_free(last);
+    lx_free(changes);
     return result;
 }
 
@@ -544,8 +566,8 @@ static lx_result gather_tile(void *user, size_t task, uint32_t worker, lx_error 
         const uint32_t end = first + chunk < s->count ? first + chunk : s->count;
         memset(s->sums, 0, 2 * chunk_luxels * g->stride * sizeof *s->sums);
         const size_t count = make_starts(g, s, first, end);
-        if (s->met) memset(s->met, 0, 2 * chunk_luxels * g->stride * sizeof *s->met);
-        const lx_gather_output out = {.sums = s->sums, .met = s->met};
+        if (g->met_estimates) memset(s->met, 0, 2 * chunk_luxels * g->stride * sizeof *s->met);
+        const lx_gather_output out = {.sums = s->sums, .met = g->met_estimates ? s->met : NULL};
         const lx_result result = lx_gather_trace(s->batch, &g->settings, s->starts, count, &out, error);
         if (result != LX_OK) return result;
         fold(g, state, s, task, first, end);
@@ -711,12 +733,12 @@ static lx_result create_scratch(gather_job *g, uint32_t workers, uint32_t round_
         s->sites = lx_calloc_array((size_t)tile_luxels * lx_site_count, sizeof *s->sites);
         s->starts = lx_malloc_array(chunk_luxels * rays, sizeof *s->starts);
         s->sums = lx_malloc_array(sum_rows, g->stride * sizeof *s->sums);
-        if (g->met_estimates) s->met = lx_malloc_array(sum_rows, g->stride * sizeof *s->met);
+        s->met = lx_malloc_array(sum_rows, g->stride * sizeof *s->met);
         s->mean = lx_malloc_array(cells * tile_luxels, sizeof *s->mean);
         s->variance = lx_malloc_array(cells * tile_luxels, sizeof *s->variance);
         s->found = lx_malloc_array((size_t)chunk_luxels * most_pass_rays, sizeof *s->found);
         s->distances = lx_malloc_array((size_t)chunk_luxels * most_pass_rays, sizeof *s->distances);
-        if (!s->batch || !s->direct || !s->sites || !s->starts || !s->sums || (g->met_estimates && !s->met) || !s->mean || !s->variance || !s->found ||
+        if (!s->batch || !s->direct || !s->sites || !s->starts || !s->sums || !s->met || !s->mean || !s->variance || !s->found ||
             !s->distances)
             return lx_fail_memory(error, "workers");
     }
@@ -737,7 +759,7 @@ static void release_cache(gather_job *g, uint32_t workers)
     }
     for (uint32_t t = 0; g->extras && t < g->job->map.tile_count; ++t) lx_free(g->extras[t].items);
     void **arrays[] = {(void **)&g->scratch, (void **)&g->extras, (void **)&g->albedo, (void **)&g->radiosity, (void **)&g->rows[0], (void **)&g->rows[1],
-                       (void **)&g->hits, (void **)&g->met_estimates, (void **)&g->closeness, (void **)&g->spacing};
+                       (void **)&g->rows[2], (void **)&g->hits, (void **)&g->met_estimates, (void **)&g->closeness, (void **)&g->spacing};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) {
         lx_free(*arrays[i]);
         *arrays[i] = NULL;
@@ -785,10 +807,10 @@ static lx_result allocate(gather_job *g, lx_error *error)
     g->scales = lx_calloc_array(g->row_layers, sizeof *g->scales);
     g->authored = lx_calloc_array(layers, sizeof *g->authored);
     g->albedo = lx_calloc_array(cached, sizeof *g->albedo);
-    g->closeness = lx_calloc_array(cached, sizeof *g->closeness);
+    g->closeness = lx_calloc_array(luxels, sizeof *g->closeness);
     g->spacing = lx_calloc_array(luxels, sizeof *g->spacing);
     g->radiosity = lx_calloc_array(cached, g->stride * sizeof *g->radiosity);
-    for (int i = 0; i < 2; ++i) g->rows[i] = lx_calloc_array(cached, g->stride * sizeof *g->rows[i]);
+    for (int i = 0; i < 3; ++i) g->rows[i] = lx_calloc_array(i < 2 || is_truncated(g) ? cached : 0, g->stride * sizeof *g->rows[i]);
     g->hits = lx_malloc_array(cached, g->pass_rays * sizeof *g->hits);
     g->extras = lx_calloc_array(tiles, sizeof *g->extras);
     g->direct = lx_calloc_array(luxels, layers * sizeof *g->direct);
@@ -800,7 +822,7 @@ static lx_result allocate(gather_job *g, lx_error *error)
     g->layer_means = lx_calloc_array(layers, sizeof *g->layer_means);
     g->halvings = lx_calloc_array(tiles, layers * sizeof *g->halvings);
     g->gain = lx_malloc_array(layers, sizeof *g->gain);
-    if (!g->scales || !g->authored || !g->albedo || !g->closeness || !g->spacing || !g->radiosity || !g->rows[0] || !g->rows[1] || !g->hits || !g->extras || !g->direct || !g->indirect ||
+    if (!g->scales || !g->authored || !g->albedo || !g->closeness || !g->spacing || !g->radiosity || !g->rows[0] || !g->rows[1] || !g->rows[2] || !g->hits || !g->extras || !g->direct || !g->indirect ||
         !g->pass_change || !g->pass_energy || !g->converged || !g->tiles || !g->layer_means || !g->halvings || !g->gain)
         return lx_fail_memory(error, "layers; --memory bakes them in groups");
     for (size_t l = 0; l < layers; ++l) g->gain[l] = 1;
@@ -910,7 +932,7 @@ static lx_result bake_group(lx_bake_job *job, uint32_t first, uint32_t count, lx
                     .luxel_count = job->map.view.count, .pass_rays = samples < 128 ? 16 : most_pass_rays};
     g.stride = 3 * (size_t)g.row_layers;
     g.settings.bounces = bounces;
-    g.interpolates = bounces > 0 && bake->desc.interpolation > 0 && !has_unsampled_sky(bake);
+    g.interpolates = bake->desc.interpolation > 0 && !has_unsampled_sky(bake);
     LX_TRY(allocate(&g, error));
     LX_TRY(allocate_met(&g, error));
     find_authored(&g);

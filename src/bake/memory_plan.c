@@ -12,32 +12,32 @@ static const struct {
     uint32_t albedo;
     uint32_t pass_ray;        // and ray of the passes: the luxel it hit,
     uint32_t extra;           // and what paths that went on found, on average
-    uint32_t sum;             // estimate of the sum of all layers, and by what knots it is interpolated
+    uint32_t sum;             // estimate of the sum of all layers, how close what is around is, and by what knots the luxel is interpolated
     uint32_t estimate;        // and layer: direct and indirect light
     uint32_t met;             // and layer whose light gather rays meet: a part of its direct light
     uint32_t row;             // and layer, layers padded: radiosity, and what two passes add to it
+    uint32_t pass_row;        // likewise, where bounces are counted: one more pass
     // Per texel of the pages:
     uint32_t place;
     // Per tile and layer:
     uint32_t tile;
     // Per worker:
     uint32_t batches;
-    uint32_t worker_row; // and layer, padded: sums of a tile
-    uint32_t worker_met; // and what is met of them
+    uint32_t worker_row; // and layer, padded: sums of a tile, and what is met of them
     uint32_t worker_cell; // and cell of the largest monitor: light of a tile
 } cost = {
-    .albedo = sizeof(lx_rgb) + sizeof(float),
+    .albedo = sizeof(lx_rgb),
     .pass_ray = sizeof(uint32_t),
     .extra = 40,
-    .sum = 5 * sizeof(float) + sizeof(uint8_t),
+    .sum = 6 * sizeof(float) + sizeof(uint8_t),
     .estimate = 2 * sizeof(lx_estimate),
     .met = sizeof(lx_estimate),
     .row = 3 * sizeof(float) + 2 * 3 * sizeof(uint16_t),
+    .pass_row = 3 * sizeof(uint16_t),
     .place = 2 * sizeof(uint32_t),
     .tile = 4 * sizeof(double) + 1,
     .batches = 4 << 20,
-    .worker_row = lx_luxel_tile_edge * lx_luxel_tile_edge * 3 * sizeof(float),
-    .worker_met = lx_luxel_tile_edge * lx_luxel_tile_edge * 3 * sizeof(float),
+    .worker_row = 2 * lx_luxel_tile_edge * lx_luxel_tile_edge * 3 * sizeof(float),
     .worker_cell = lx_luxel_tile_edge * lx_luxel_tile_edge * (sizeof(lx_rgb) + sizeof(float)),
 };
 
@@ -82,12 +82,12 @@ static uint64_t group_bytes(const lx_bake_job *job, const lx_finish *finish, uin
     const lx_bake *bake = job->bake;
     const uint64_t luxels = job->map.view.count, padded = lx_row_layers(layers);
     const uint32_t workers = lx_pool_worker_count(bake->scene->context->pool);
-    const bool bounces = !bake->desc.direct_only && bake->desc.transport.bounces > 0;
+    const bool bounces = !bake->desc.direct_only && bake->desc.transport.bounces > 0, truncated = bake->desc.transport.bounces != LX_BOUNCES_INF;
     const uint64_t estimates = luxels * (cost.sum + (uint64_t)cost.estimate * layers) + (uint64_t)job->map.tile_count * cost.tile * layers;
-    const uint64_t met = met_layer_count(bake) < layers ? met_layer_count(bake) : layers, worker_row = cost.worker_row + (met > 0 ? cost.worker_met : 0);
-    uint64_t cache = lookup_bytes(bake) + workers * (cost.batches + worker_row * padded + (uint64_t)cost.worker_cell * largest_cell_count(bake));
+    const uint64_t met = met_layer_count(bake) < layers ? met_layer_count(bake) : layers;
+    uint64_t cache = lookup_bytes(bake) + workers * (cost.batches + cost.worker_row * padded + (uint64_t)cost.worker_cell * largest_cell_count(bake));
     cache += luxels * cost.met * met;
-    if (bounces) cache += luxels * (cost.albedo + cost.pass_ray * most_pass_rays + cost.extra + cost.row * padded);
+    if (bounces) cache += luxels * (cost.albedo + cost.pass_ray * most_pass_rays + cost.extra + (cost.row + (truncated ? cost.pass_row : 0)) * padded);
     const uint64_t finishing = lx_finish_worker_bytes(finish) * (layers < workers ? layers : workers); // the cache is gone by then
     return estimates + (cache > finishing ? cache : finishing);
 }
