@@ -5,6 +5,7 @@ import math
 import os
 import subprocess
 import sys
+import tempfile
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..")
 PROGRAM = os.environ.get("LUXEL_BENCH_BAKES") or os.path.join(ROOT, "build/release/bench/bench_bakes")
@@ -19,6 +20,20 @@ def shared(name):
         if folder and os.path.exists(path):
             return path
     return None
+
+
+def bakes_of_room(name, bakes, **options):
+    """Bakes of one of tests/statistical/rooms.py."""
+    import rooms
+    here = os.getcwd()
+    with tempfile.TemporaryDirectory(prefix="luxel-rooms-") as folder:
+        os.chdir(folder)
+        try:
+            scene, sky = rooms.make(name)
+            scene.save("scene.glb")
+            return Bakes("scene.glb", bakes, sky=sky[1] if sky else None, **options)
+        finally:
+            os.chdir(here)
 
 
 class Bakes:

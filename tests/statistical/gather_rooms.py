@@ -6,12 +6,10 @@ twice what the noise that is left could hide."""
 
 import os
 import sys
-import tempfile
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path.insert(0, os.path.join(HERE, "..", "..", "bench"))
 import bakes
-import rooms
 
 ALLOWED = 0.01
 SAMPLES = {"cornell": 512, "windows": 512, "sheets": 512, "clutter": 512}
@@ -22,13 +20,8 @@ def main():
     bakes.PROGRAM = os.path.abspath(sys.argv[1])
     failures = 0
     for name in sys.argv[2:] or SAMPLES:
-        with tempfile.TemporaryDirectory(prefix="luxel-rooms-") as folder:
-            os.chdir(folder)
-            scene, options = rooms.make(name)
-            scene.save("scene.glb")
-            path = "integrator=path,samples=%d,salt=" % SAMPLES[name]
-            b = bakes.Bakes("scene.glb", ["samples=1024", path + "1", path + "2"], page_size=PAGE.get(name, 64), sky=options[1] if options else None)
-            os.chdir(HERE)
+        path = "integrator=path,samples=%d,salt=" % SAMPLES[name]
+        b = bakes.bakes_of_room(name, ["samples=1024", path + "1", path + "2"], page_size=PAGE.get(name, 64))
         error, hides = b.error_against(0, 1, 2)
         good = error <= ALLOWED + 2 * hides and b.texels > 300
         failures += not good

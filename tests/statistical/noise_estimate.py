@@ -5,12 +5,10 @@ The truth is a bake of many more and other samples at the same sites. The estima
 
 import os
 import sys
-import tempfile
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path.insert(0, os.path.join(HERE, "..", "..", "bench"))
 import bakes
-import rooms
 
 LEAST, MOST = 0.8, 1.25  # of the real noise over the estimate
 ROOMS = ("cornell", "white_room", "courtyard", "round_things")
@@ -21,13 +19,7 @@ def main():
     bakes.PROGRAM = os.path.abspath(sys.argv[1])
     failures = 0
     for name in sys.argv[2:] or ROOMS:
-        with tempfile.TemporaryDirectory(prefix="luxel-noise-") as folder:
-            os.chdir(folder)
-            scene, options = rooms.make(name)
-            scene.save("scene.glb")
-            b = bakes.Bakes("scene.glb", ["samples=%d" % n for n in SAMPLES] + ["samples=4096,salt=1,interpolation=0"], page_size=64, borders=1,
-                            sky=options[1] if options else None)
-            os.chdir(HERE)
+        b = bakes.bakes_of_room(name, ["samples=%d" % n for n in SAMPLES] + ["samples=4096,salt=1,interpolation=0"], page_size=64, borders=1)
         for samples, bake in zip(SAMPLES, b.bakes):
             ratio = bake["off_by"] / bake["noise"]
             good = LEAST <= ratio <= MOST
