@@ -75,6 +75,17 @@ class Bakes:
         spread = math.sqrt((noise ** 2 + 2 * max(0.0, square) * noise) / max(1, self.texels))
         return math.copysign(math.sqrt(abs(square)), square) / mean, math.sqrt(spread) / mean
 
+    def bias(self, pair, referees):
+        """Relative RMSE between the means of two kinds of bakes, each made twice with independent noise, free of the noise of both; negative where noise made
+        its square negative; and the standard error that noise leaves on it, as the RMSE that could hide in it."""
+        (a, b), (p, q) = pair, referees
+        square = (self.dot(a, p, b, q) + self.dot(a, q, b, p)) / 2
+        mean = (self.mean(p) + self.mean(q)) / 2
+        noise = (self.dot(a, b, a, b) + self.dot(p, q, p, q)) / 2  # variances of one bake of either kind
+        # Per texel and pairing (b + n1)(b + n2): variances noise² and 2 b² noise; what the two pairings share is counted whole. Channels count as one value.
+        spread = math.sqrt((noise ** 2 + 2 * max(0.0, square) * noise) / max(1, self.texels))
+        return math.copysign(math.sqrt(abs(square)), square) / mean, math.sqrt(spread) / mean
+
     def noise(self, first, second):
         """Relative RMSE of either of two bakes of one kind."""
         return math.sqrt(self.dot(first, second, first, second) / 2) / ((self.mean(first) + self.mean(second)) / 2)

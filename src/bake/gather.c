@@ -89,14 +89,16 @@ typedef struct gather_job {
     float *closeness;       // [luxel] of what is around, 1 / m²; INFINITY: not to be interpolated
     uint8_t *spacing;       // [luxel] of the knots it is interpolated from; 0: it sends gather rays
     bool interpolates;
-    float *radiosity;       // [luxel][3][row_layers] of all passes so far, times scale
+    float *radiosity;       // [luxel][3][row_layers] of all passes so far, times scale; until gathering begins it lives where `indirect` will
     uint16_t *rows[3];      // [luxel][3][row_layers] what the last pass added, what the next one will, and with a number of bounces what the pass before the last added;
                             // in the end what gather rays read
+    uint16_t *rows_direct;  // [luxel][3][row_layers] light straight from the sources
     uint32_t pass;          // passes so far
     uint32_t pass_rays;
     uint32_t *hits;         // [luxel][pass_rays]
     lx_gather_extras *extras; // [tile]; targets are luxels of the tile
     lx_estimate *direct, *indirect; // [layer][luxel]
+    size_t indirect_bytes;
     lx_estimate *met_estimates; // [those layers that gather rays may meet][luxel]: a part of direct light, taken into it after the last round
     lx_estimate **met;      // [layer] where among them; NULL: never met
     double *pass_change, *pass_energy; // [tile][layer]
@@ -335,6 +337,7 @@ static lx_result light_tile(void *user, size_t task, uint32_t worker, lx_error *
     for (uint32_t i = 0; bounces && i < s->count; ++i) {
         const size_t row = g->stride * s->luxel[i];
         reflect(g, s->luxel[i], s->sums + g->stride * i, 1, g->radiosity + row, g->rows[0] + row);
+        memcpy(g->rows_direct + row, g->rows[0] + row, g->stride * sizeof *g->rows_direct);
     }
     return LX_OK;
 }
@@ -395,7 +398,7 @@ static lx_result pass_tile(void *user, size_t task, uint32_t worker, lx_error *e
     return LX_OK;
 }
 
-// What gather rays read: rows[0] the sum of all passes, for first hits; rows[1] that without the last, for later ones, which are a bounce further.
+// What gather rays read: rows[0] the sum of all passes, for first hits; where bounces are counted rows[1], that without the last, for later ones, which are a bounce further.
 static lx_result sum_rows(void *user, size_t task, uint32_t worker, lx_error *error)
 {
     (void)worker;
@@ -406,7 +409,7 @@ static lx_result sum_rows(void *user, size_t task, uint32_t worker, lx_error *er
     for (size_t i = g->stride * tile->first; i < g->stride * ((size_t)tile->first + tile->count); ++i) {
         const float last = truncated ? lx_row_decode_small(g->rows[0][i]) * LX_ROW_UNIT : 0;
         g->rows[0][i] = lx_row_encode(g->radiosity[i]);
-        g->rows[1][i] = lx_row_encode(g->radiosity[i] - last);
+        if (truncated) g->rows[1][i] = lx_row_encode(g->radiosity[i] - last);
     }
     return LX_OK;
 }
@@ -506,8 +509,8 @@ static float take_round(const gather_job *g, const float *a, const float *b, flo
     return difference;
 }
 
-// Takes the round's sums into the estimates of luxels first … end - 1 of the list: layer by layer, as estimates lie in memory.
-static void fold(const gather_job *g, const tile_state *state, const gather_scratch *s, size_t task, uint32_t first, uint32_t end)
+// Takes the round's sums into the estimates of luxels from … end - 1 of the list, of the chunk that begins with `first`: layer by layer, as estimates lie in memory.
+static void fold_block(const gather_job *g, const tile_state *state, const gather_scratch *s, size_t task, uint32_t first, uint32_t from, uint32_t end)
 {
     for (uint32_t l = 0; l < g->layer_count; ++l) {
         if (state->frozen[l]) continue;
@@ -515,7 +518,7 @@ static void fold(const gather_job *g, const tile_state *state, const gather_scra
         const lx_estimate *direct = g->direct + (size_t)l * g->luxel_count;
         halving *halvings = &g->halvings[(size_t)task * g->layer_count + l];
         lx_estimate *indirect = g->indirect + (size_t)l * g->luxel_count, *met = g->met[l];
-        for (uint32_t i = first; i < end; ++i) {
+        for (uint32_t i = from; i < end; ++i) {
             const size_t a = g->stride * (i - first) + l, b = a + g->stride * chunk_luxels;
             const uint32_t luxel = s->luxel[i];
             const lx_rgb before = indirect[luxel].mean;
@@ -531,6 +534,13 @@ static void fold(const gather_job *g, const tile_state *state, const gather_scra
             g->sums[luxel].squares += difference * difference * authored * authored;
         }
     }
+}
+
+// So few luxels at a time that their sums of all layers stay in the first cache.
+static void fold(const gather_job *g, const tile_state *state, const gather_scratch *s, size_t task, uint32_t first, uint32_t end)
+{
+    enum { block = 16 };
+    for (uint32_t from = first; from < end; from += block) fold_block(g, state, s, task, first, from, from + block < end ? from + block : end);
 }
 
 // Root mean square over the tile's luxels of a layer's standard error over its light.
@@ -758,8 +768,8 @@ static void release_cache(gather_job *g, uint32_t workers)
         for (size_t k = 0; k < sizeof arrays / sizeof *arrays; ++k) lx_free(arrays[k]);
     }
     for (uint32_t t = 0; g->extras && t < g->job->map.tile_count; ++t) lx_free(g->extras[t].items);
-    void **arrays[] = {(void **)&g->scratch, (void **)&g->extras, (void **)&g->albedo, (void **)&g->radiosity, (void **)&g->rows[0], (void **)&g->rows[1],
-                       (void **)&g->rows[2], (void **)&g->hits, (void **)&g->met_estimates, (void **)&g->closeness, (void **)&g->spacing};
+    void **arrays[] = {(void **)&g->scratch, (void **)&g->extras, (void **)&g->albedo, (void **)&g->rows[0], (void **)&g->rows[1],
+                       (void **)&g->rows[2], (void **)&g->rows_direct, (void **)&g->hits, (void **)&g->met_estimates, (void **)&g->closeness, (void **)&g->spacing};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) {
         lx_free(*arrays[i]);
         *arrays[i] = NULL;
@@ -809,12 +819,16 @@ static lx_result allocate(gather_job *g, lx_error *error)
     g->albedo = lx_calloc_array(cached, sizeof *g->albedo);
     g->closeness = lx_calloc_array(luxels, sizeof *g->closeness);
     g->spacing = lx_calloc_array(luxels, sizeof *g->spacing);
-    g->radiosity = lx_calloc_array(cached, g->stride * sizeof *g->radiosity);
     for (int i = 0; i < 3; ++i) g->rows[i] = lx_calloc_array(i < 2 || is_truncated(g) ? cached : 0, g->stride * sizeof *g->rows[i]);
+    g->rows_direct = lx_calloc_array(cached, g->stride * sizeof *g->rows_direct);
     g->hits = lx_malloc_array(cached, g->pass_rays * sizeof *g->hits);
     g->extras = lx_calloc_array(tiles, sizeof *g->extras);
     g->direct = lx_calloc_array(luxels, layers * sizeof *g->direct);
-    g->indirect = lx_calloc_array(luxels, layers * sizeof *g->indirect);
+    g->indirect_bytes = layers * sizeof *g->indirect;
+    if (cached && g->stride * sizeof *g->radiosity > g->indirect_bytes) g->indirect_bytes = g->stride * sizeof *g->radiosity;
+    g->indirect = lx_calloc_array(luxels, g->indirect_bytes);
+    g->indirect_bytes *= luxels;
+    g->radiosity = (float *)g->indirect;
     g->pass_change = lx_calloc_array(tiles, layers * sizeof *g->pass_change);
     g->pass_energy = lx_calloc_array(tiles, layers * sizeof *g->pass_energy);
     g->converged = lx_calloc_array(layers, 1);
@@ -822,7 +836,7 @@ static lx_result allocate(gather_job *g, lx_error *error)
     g->layer_means = lx_calloc_array(layers, sizeof *g->layer_means);
     g->halvings = lx_calloc_array(tiles, layers * sizeof *g->halvings);
     g->gain = lx_malloc_array(layers, sizeof *g->gain);
-    if (!g->scales || !g->authored || !g->albedo || !g->closeness || !g->spacing || !g->radiosity || !g->rows[0] || !g->rows[1] || !g->rows[2] || !g->hits || !g->extras || !g->direct || !g->indirect ||
+    if (!g->scales || !g->authored || !g->albedo || !g->closeness || !g->spacing || !g->rows[0] || !g->rows[1] || !g->rows[2] || !g->rows_direct || !g->hits || !g->extras || !g->direct || !g->indirect ||
         !g->pass_change || !g->pass_energy || !g->converged || !g->tiles || !g->layer_means || !g->halvings || !g->gain)
         return lx_fail_memory(error, "layers; --memory bakes them in groups");
     for (size_t l = 0; l < layers; ++l) g->gain[l] = 1;
@@ -944,13 +958,16 @@ static lx_result bake_group(lx_bake_job *job, uint32_t first, uint32_t count, lx
     job->stages.direct += lx_lap(&stage_start);
     if (bounces > 0) {
         LX_TRY(run_passes(&g, bounces == LX_BOUNCES_INF ? bounces : bounces - 1, error));
+        memset(g.indirect, 0, g.indirect_bytes);
     }
     job->stages.cache += lx_lap(&stage_start);
     g.settings = (lx_gather_settings){.tracer = bake->tracer, .lookup = &g.lookup, .uses = g.uses, .scales = g.scales, .row_layers = g.row_layers,
                                       .bounces = bounces, .direct = !bake->desc.indirect_only, .near_texels = near_texels};
     if (bounces > 0) {
         g.settings.rows = g.rows[0];
-        g.settings.rows_later = bounces > 1 ? g.rows[1] : NULL;
+        g.settings.rows_later = !is_truncated(&g) ? g.rows[0] : bounces > 1 ? g.rows[1] : NULL;
+        g.settings.rows_direct = g.rows_direct;
+        g.settings.albedo = g.albedo;
     }
     LX_TRY(run_rounds(&g, deadline, error));
     if (g.interpolates) LX_TRY(lx_pool_run(pool, job->map.tile_count, interpolate_tile, &g, "gather", NULL, error));

@@ -8,9 +8,11 @@
 #include "trace/sampling.h"
 #include "trace/tracer_data.h"
 
+#include <string.h>
+
 enum {
     batch_size = lx_gather_batch_size,
-    look_ahead = 8,        // rows that are fetched before they are added
+    look_ahead = 24,        // rows that are fetched before they are added
     near_until = 4,        // vertices; paths caught in a corner are looked up all the same
     most_passes = 256,     // surfaces one ray may pass through
 };
@@ -25,17 +27,18 @@ typedef struct flight {
     uint32_t stream, sample, target;
     uint32_t vertex, passes;
     uint32_t last_surface, last_triangle;
+    bool is_lit; // all light straight from sources is known where the ray came from: what it meets of them is counted already
 } flight;
 
 typedef struct vertex_record {
     lx_receiver receiver;
-    lx_rgb throughput;
-    uint32_t stream, sample, target, number;
+    flight flight; // that got there
 } vertex_record;
 
 typedef struct pending {
     lx_taps taps;
     uint32_t index; // of the ray in the batch
+    bool near;
 } pending;
 
 typedef struct slow_row {
@@ -58,6 +61,10 @@ struct lx_gather_batch {
     flight flights[2 * batch_size];
     lx_shading shading[2 * batch_size];
     size_t slow_count;
+    // Rays of the second loop that are still to be traced.
+    lx_ray onward_rays[2 * batch_size];
+    flight onward[2 * batch_size];
+    size_t onward_count;
     slow_row slow_rows[2 * batch_size];
     size_t slow_row_count;
     vertex_record vertices[2 * batch_size];
@@ -164,6 +171,67 @@ static uint32_t tap_bits(uint32_t stream, uint32_t vertex, uint32_t sample)
     return lx_hash32((vertex == 0 ? stream : dimension_key(stream, vertex, 0)) ^ (sample * 0x9e3779b9u));
 }
 
+// ---- hits that are too near -------------------------------------------------------------------------------------------------------
+
+// A ray goes on from `receiver`, if not below its geometric surface; the flight is what it was when it got there.
+static void go_on(lx_gather_batch *b, const lx_receiver *receiver, flight f)
+{
+    const lx_vec3 local = cosine_direction(lx_sobol_pair(f.sample, dimension_key(f.stream, f.vertex + 1, dimension_bounce)));
+    const lx_vec3 direction = lx_to_world(receiver->normal, local);
+    if (!(lx_dot(direction, receiver->geometric_normal) > 0)) return;
+    ++f.vertex;
+    f.cosine = local.z;
+    f.passes = 0;
+    f.last_surface = LX_MISS;
+    b->onward_rays[b->onward_count] = (lx_ray){.origin = lx_offset_origin(receiver->position, receiver->geometric_normal), .direction = direction,
+                                               .t_max = INFINITY};
+    b->onward[b->onward_count++] = f;
+}
+
+// The path is but one of a luxel's many rays: it goes on as often as what it would bring counts, beside rays that are looked up at once.
+static bool survives(flight *f, lx_rgb albedo)
+{
+    const lx_rgb throughput = lx_rgb_mul(f->throughput, albedo);
+    const float survival = lx_min(1, lx_rgb_max(throughput));
+    if (!(lx_sobol_one(f->sample, dimension_key(f->stream, f->vertex, dimension_roulette)) < survival)) return false;
+    f->throughput = lx_rgb_scale(throughput, 1 / survival);
+    return true;
+}
+
+static void fetch_row(const uint16_t *row, size_t stride)
+{
+    for (size_t k = 0; k < stride; k += 32) __builtin_prefetch(row + k);
+}
+
+static void note_row(lx_gather_batch *b, const uint16_t *rows, const lx_gather_settings *settings, const flight *f, uint32_t luxel)
+{
+    b->slow_rows[b->slow_row_count++] = (slow_row){rows + 3 * (size_t)settings->row_layers * luxel, f->target, f->throughput};
+}
+
+static void add_slow_rows(lx_gather_batch *b, const lx_gather_settings *settings, const lx_gather_output *out)
+{
+    const size_t stride = 3 * (size_t)settings->row_layers;
+    for (size_t i = 0; i < b->slow_row_count; ++i) {
+        if (i + look_ahead < b->slow_row_count) fetch_row(b->slow_rows[i + look_ahead].row, stride);
+        const slow_row *r = &b->slow_rows[i];
+        const float factor[3] = {r->weight.r, r->weight.g, r->weight.b};
+        lx_row_add_scaled(out->sums + stride * r->target, r->row, settings->row_layers, factor);
+    }
+    b->slow_row_count = 0;
+}
+
+// A plain hit too near for all light to be looked up: light straight from the sources is, and a ray goes on for the rest.
+static void leave_near(lx_gather_batch *b, const lx_gather_settings *settings, flight f, const lx_hit *hit, uint32_t luxel)
+{
+    note_row(b, settings->rows_direct, settings, &f, luxel);
+    if (!survives(&f, settings->albedo[luxel])) return;
+    lx_receiver r;
+    lx_hit_geometry(settings->tracer, hit, &r.position, &r.geometric_normal);
+    r.normal = lx_normal_at(settings->tracer, hit->surface, hit->triangle, hit->u, hit->v);
+    f.is_lit = true;
+    go_on(b, &r, f);
+}
+
 // ---- the first loop ----------------------------------------------------------------------------------------------------------------
 
 static void send(lx_gather_batch *b, const lx_ray *ray, const lx_hit *hit, const flight *f)
@@ -231,11 +299,6 @@ static size_t make_rays(lx_gather_batch *b, const lx_gather_start *starts, size_
     return made;
 }
 
-static void fetch_row(const uint16_t *row, size_t stride)
-{
-    for (size_t k = 0; k < stride; k += 32) __builtin_prefetch(row + k);
-}
-
 static void add_rows(lx_gather_batch *b, const lx_gather_settings *settings, const lx_gather_output *out, size_t count)
 {
     const size_t stride = 3 * (size_t)settings->row_layers;
@@ -263,12 +326,13 @@ static void first_hits(lx_gather_batch *b, const lx_gather_settings *settings, c
         }
         const lx_lookup_surface *surface = &settings->lookup->surfaces[hit->surface];
         if (surface->plain && ((hit->back && !surface->double_sided) || settings->bounces == 0)) continue; // black
-        const bool may_look_up = surface->plain && surface->triangles && !hit->back && hit->t >= settings->near_texels * surface->texel_m &&
+        const bool near = hit->t < settings->near_texels * surface->texel_m;
+        const bool may_look_up = surface->plain && surface->triangles && !hit->back && (!near || settings->rows_direct) &&
                                  surface->triangles[hit->triangle].chart != LX_NO_CHART;
         if (may_look_up) {
             const lx_taps taps = lx_lookup_taps(settings->lookup, hit, tap_bits(start->stream, 0, start->sample));
             __builtin_prefetch(&settings->lookup->places[taps.tap]);
-            b->pending[pending_count++] = (pending){taps, (uint32_t)i};
+            b->pending[pending_count++] = (pending){taps, (uint32_t)i, near};
             continue;
         }
         const flight f = {.throughput = {1, 1, 1}, .cosine = b->cosines[i], .stream = start->stream, .sample = start->sample,
@@ -280,10 +344,13 @@ static void first_hits(lx_gather_batch *b, const lx_gather_settings *settings, c
         const uint32_t i = b->pending[k].index;
         const lx_gather_start *start = &starts[b->found[i]];
         const uint32_t luxel = lx_lookup_luxel(settings->lookup, b->pending[k].taps);
-        if (luxel == LX_NO_LUXEL) {
+        if (luxel == LX_NO_LUXEL || b->pending[k].near) {
             const flight f = {.throughput = {1, 1, 1}, .cosine = b->cosines[i], .stream = start->stream, .sample = start->sample,
                               .target = start->target, .last_surface = LX_MISS};
-            send(b, &b->rays[i], &b->hits[i], &f);
+            if (luxel == LX_NO_LUXEL)
+                send(b, &b->rays[i], &b->hits[i], &f);
+            else
+                leave_near(b, settings, f, &b->hits[i], luxel);
         } else if (out->luxels) {
             out->luxels[first_start + b->found[i]] = luxel;
         } else { // in place: found_count <= i
@@ -293,6 +360,7 @@ static void first_hits(lx_gather_batch *b, const lx_gather_settings *settings, c
         }
     }
     if (settings->rows && !out->luxels) add_rows(b, settings, out, found_count);
+    add_slow_rows(b, settings, out);
 }
 
 // ---- the second loop -----------------------------------------------------------------------------------------------------------------
@@ -310,27 +378,28 @@ static bool passes_on(flight *f, const lx_shading *s)
     return pass;
 }
 
-static bool make_vertex(const flight *f, const lx_shading *s, vertex_record *out)
+static bool make_vertex(flight *f, const lx_shading *s, vertex_record *out)
 {
-    // The path is but one of a luxel's many rays: it goes on as often as what it would bring counts, beside rays that are looked up at once.
-    lx_rgb throughput = lx_rgb_mul(f->throughput, s->albedo);
-    const float survival = lx_min(1, lx_rgb_max(throughput));
-    if (!(lx_sobol_one(f->sample, dimension_key(f->stream, f->vertex, dimension_roulette)) < survival)) return false;
-    throughput = lx_rgb_scale(throughput, 1 / survival);
+    if (!survives(f, s->albedo)) return false;
     const float side = s->front ? 1.0f : -1.0f;
-    *out = (vertex_record){.receiver = {s->position, lx_scale(s->normal, side), lx_scale(s->geometric_normal, side)}, .throughput = throughput,
-                           .stream = f->stream, .sample = f->sample, .target = f->target, .number = f->vertex + 1};
+    *out = (vertex_record){.receiver = {s->position, lx_scale(s->normal, side), lx_scale(s->geometric_normal, side)}, .flight = *f};
     return true;
 }
 
-// The luxel that answers for a hit of the second loop; LX_NO_LUXEL: the path goes on.
-static uint32_t slow_lookup(const lx_gather_settings *settings, const flight *f, const lx_hit *hit)
+// What is known of a hit of the second loop.
+typedef struct answer {
+    uint32_t luxel; // that lies there; LX_NO_LUXEL: none
+    bool is_near;   // so near that its mean says little: the path goes on
+} answer;
+
+static answer slow_lookup(const lx_gather_settings *settings, const flight *f, const lx_hit *hit)
 {
     const lx_lookup_surface *surface = &settings->lookup->surfaces[hit->surface];
-    if (hit->back || !surface->triangles || surface->triangles[hit->triangle].chart == LX_NO_CHART) return LX_NO_LUXEL;
-    if (hit->t < settings->near_texels * surface->texel_m && f->vertex < near_until) return LX_NO_LUXEL;
-    return lx_lookup_luxel(settings->lookup, lx_lookup_taps(settings->lookup, hit, tap_bits(f->stream, f->vertex, f->sample)));
+    if (hit->back || !surface->triangles || surface->triangles[hit->triangle].chart == LX_NO_CHART) return (answer){LX_NO_LUXEL, false};
+    const uint32_t luxel = lx_lookup_luxel(settings->lookup, lx_lookup_taps(settings->lookup, hit, tap_bits(f->stream, f->vertex, f->sample)));
+    return (answer){luxel, hit->t < settings->near_texels * surface->texel_m && f->vertex < near_until};
 }
+
 
 // Takes note of a look-up; add_slow_rows adds what was noted, fetching ahead.
 static lx_result find_slow_row(lx_gather_batch *b, const lx_gather_settings *settings, const flight *f, uint32_t luxel, const lx_gather_output *out,
@@ -344,20 +413,8 @@ static lx_result find_slow_row(lx_gather_batch *b, const lx_gather_settings *set
         return LX_OK;
     }
     const uint16_t *rows = f->vertex == 0 ? settings->rows : settings->rows_later;
-    if (rows) b->slow_rows[b->slow_row_count++] = (slow_row){rows + 3 * (size_t)settings->row_layers * luxel, f->target, f->throughput};
+    if (rows) note_row(b, rows, settings, f, luxel);
     return LX_OK;
-}
-
-static void add_slow_rows(lx_gather_batch *b, const lx_gather_settings *settings, const lx_gather_output *out)
-{
-    const size_t stride = 3 * (size_t)settings->row_layers;
-    for (size_t i = 0; i < b->slow_row_count; ++i) {
-        if (i + look_ahead < b->slow_row_count) fetch_row(b->slow_rows[i + look_ahead].row, stride);
-        const slow_row *r = &b->slow_rows[i];
-        const float factor[3] = {r->weight.r, r->weight.g, r->weight.b};
-        lx_row_add_scaled(out->sums + stride * r->target, r->row, settings->row_layers, factor);
-    }
-    b->slow_row_count = 0;
 }
 
 // The light of a vertex is but one of a luxel's many rays: roulette skips more of it than the path integrator does.
@@ -366,20 +423,21 @@ static bool sample_light(const lx_gather_settings *settings, uint32_t source, co
     // source_scales are a twentieth of the mean. Few samples come near their bound.
     enum { scale_factor = 400, bound_excess = 2 };
     const lx_tracer *tracer = settings->tracer;
-    const uint32_t key = lx_hash_combine(tracer->source_keys[source], gather_key + v->number);
+    const flight *f = &v->flight;
+    const uint32_t key = lx_hash_combine(tracer->source_keys[source], gather_key + f->vertex + 1);
     const float scale = scale_factor * tracer->source_scales[source];
     float bound = lx_source_bound(tracer, source, &v->receiver);
     if (bound == 0) return false;
     // Within the sphere around a long tube or a string of bulbs: nothing is certain, but few places are much brighter than this.
     const lx_source_sphere *sphere = &tracer->source_spheres[source];
     if (!(bound < INFINITY) && sphere->power < INFINITY && sphere->radius > 0) bound = 4 * sphere->power / (sphere->radius * sphere->radius);
-    const float brightness = lx_rgb_max(v->throughput);
-    const float chance = lx_light_roulette(v->stream, v->sample, key ^ 0x68bc21ebu, brightness * bound / bound_excess, scale);
+    const float brightness = lx_rgb_max(f->throughput);
+    const float chance = lx_light_roulette(f->stream, f->sample, key ^ 0x68bc21ebu, brightness * bound / bound_excess, scale);
     if (chance == 0) return false;
-    const lx_vec2 u = lx_sobol_pair(v->sample, lx_hash_combine(v->stream, key));
+    const lx_vec2 u = lx_sobol_pair(f->sample, lx_hash_combine(f->stream, key));
     if (!lx_sample_source(tracer, source, &v->receiver, u, 1, ray, light, cell)) return false;
     *light = lx_rgb_scale(*light, chance);
-    const float again = lx_light_roulette(v->stream, v->sample, key ^ 0x02e5be93u, brightness * lx_rgb_max(*light), scale);
+    const float again = lx_light_roulette(f->stream, f->sample, key ^ 0x02e5be93u, brightness * lx_rgb_max(*light), scale);
     *light = lx_rgb_scale(*light, again);
     return again > 0;
 }
@@ -390,9 +448,9 @@ static void flush_shadow_rays(lx_gather_batch *b, const lx_gather_settings *sett
     lx_trace_transmittance(settings->tracer, b->shadow_rays, b->transmittance, count);
     b->ray_count += count;
     for (size_t k = 0; k < count; ++k) {
-        const vertex_record *v = &b->vertices[b->owner[k]];
+        const flight *f = &b->vertices[b->owner[k]].flight;
         const lx_rgb arrives = lx_rgb_mul(b->light[k], b->transmittance[k]);
-        if (!lx_rgb_is_black(arrives)) add_light(settings, out, v->number, v->target, use, b->cell[k], lx_rgb_mul(v->throughput, arrives));
+        if (!lx_rgb_is_black(arrives)) add_light(settings, out, f->vertex + 1, f->target, use, b->cell[k], lx_rgb_mul(f->throughput, arrives));
     }
 }
 
@@ -422,15 +480,19 @@ static lx_result finish_simple(lx_gather_batch *b, const lx_gather_settings *set
         const flight *f = &b->flights[i];
         const lx_hit *hit = &b->slow_hits[i];
         if (hit->surface == LX_MISS) {
-            add_sky(settings, out, f->throughput, f->cosine, f->target, b->slow_rays[i].direction, f->vertex);
+            if (!f->is_lit) add_sky(settings, out, f->throughput, f->cosine, f->target, b->slow_rays[i].direction, f->vertex);
             continue;
         }
         const lx_lookup_surface *surface = &settings->lookup->surfaces[hit->surface];
         if (surface->plain) {
             if ((hit->back && !surface->double_sided) || f->vertex >= settings->bounces) continue; // black
-            const uint32_t luxel = slow_lookup(settings, f, hit);
-            if (luxel != LX_NO_LUXEL) {
-                result = find_slow_row(b, settings, f, luxel, out, error);
+            const answer known = slow_lookup(settings, f, hit);
+            if (known.luxel != LX_NO_LUXEL && !known.is_near) {
+                result = find_slow_row(b, settings, f, known.luxel, out, error);
+                continue;
+            }
+            if (known.luxel != LX_NO_LUXEL && settings->rows_direct) {
+                leave_near(b, settings, *f, hit, known.luxel);
                 continue;
             }
         }
@@ -457,7 +519,7 @@ static lx_result step(lx_gather_batch *b, const lx_gather_settings *settings, co
         const lx_lookup_surface *surface = &settings->lookup->surfaces[hit->surface];
         if (!surface->plain) {
             const bool again = hit->surface == f.last_surface && hit->triangle == f.last_triangle;
-            if (!again) add_emission(settings, out, &f, &ray, hit, s);
+            if (!again && !f.is_lit) add_emission(settings, out, &f, &ray, hit, s);
             if (again || passes_on(&f, s)) {
                 if (++f.passes > most_passes) continue;
                 f.last_surface = hit->surface;
@@ -468,28 +530,23 @@ static lx_result step(lx_gather_batch *b, const lx_gather_settings *settings, co
                 continue;
             }
             if (!s->lit || f.vertex >= settings->bounces) continue;
-            const uint32_t luxel = slow_lookup(settings, &f, hit);
-            if (luxel != LX_NO_LUXEL) {
-                result = find_slow_row(b, settings, &f, luxel, out, error);
+            const answer known = slow_lookup(settings, &f, hit);
+            if (known.luxel != LX_NO_LUXEL && !known.is_near) {
+                result = find_slow_row(b, settings, &f, known.luxel, out, error);
                 if (result != LX_OK) return result;
                 continue;
             }
         }
+        f.is_lit = false;
         if (make_vertex(&f, s, &b->vertices[vertex_count])) ++vertex_count;
     }
     add_slow_rows(b, settings, out);
     next_events(b, settings, vertex_count, out);
-    for (size_t i = 0; i < vertex_count; ++i) {
-        const vertex_record *v = &b->vertices[i];
-        const lx_vec2 u = lx_sobol_pair(v->sample, dimension_key(v->stream, v->number, dimension_bounce));
-        const lx_vec3 local = cosine_direction(u);
-        const lx_vec3 direction = lx_to_world(v->receiver.normal, local);
-        if (!(lx_dot(direction, v->receiver.geometric_normal) > 0)) continue;
-        b->slow_rays[kept] = (lx_ray){.origin = lx_offset_origin(v->receiver.position, v->receiver.geometric_normal), .direction = direction,
-                                      .t_max = INFINITY};
-        b->flights[kept++] = (flight){.throughput = v->throughput, .cosine = local.z, .stream = v->stream, .sample = v->sample, .target = v->target,
-                                      .vertex = v->number, .last_surface = LX_MISS};
-    }
+    for (size_t i = 0; i < vertex_count; ++i) go_on(b, &b->vertices[i].receiver, b->vertices[i].flight);
+    memcpy(b->slow_rays + kept, b->onward_rays, b->onward_count * sizeof *b->slow_rays);
+    memcpy(b->flights + kept, b->onward, b->onward_count * sizeof *b->flights);
+    kept += b->onward_count;
+    b->onward_count = 0;
     lx_trace_closest(settings->tracer, b->slow_rays, b->slow_hits, kept);
     b->ray_count += kept;
     b->slow_count = kept;
@@ -500,15 +557,15 @@ lx_result lx_gather_trace(lx_gather_batch *b, const lx_gather_settings *settings
                           const lx_gather_output *out, lx_error *error)
 {
     lx_result result = LX_OK;
-    b->slow_count = 0;
+    b->slow_count = b->onward_count = b->slow_row_count = 0;
     if (out->luxels)
         for (size_t i = 0; i < count; ++i) out->luxels[i] = LX_NO_LUXEL;
     for (size_t i = 0; out->distances && i < count; ++i) out->distances[i] = INFINITY;
     for (size_t first = 0; first < count && result == LX_OK; first += batch_size) {
         const size_t n = count - first < batch_size ? count - first : (size_t)batch_size;
         first_hits(b, settings, starts + first, n, (uint32_t)first, out);
-        while (b->slow_count >= batch_size && result == LX_OK) result = step(b, settings, out, error); // each step leaves at most as many
+        while (b->slow_count + b->onward_count >= batch_size && result == LX_OK) result = step(b, settings, out, error); // each step leaves at most as many
     }
-    while (b->slow_count > 0 && result == LX_OK) result = step(b, settings, out, error);
+    while (b->slow_count + b->onward_count > 0 && result == LX_OK) result = step(b, settings, out, error);
     return result;
 }

@@ -22,6 +22,8 @@ typedef struct lx_gather_settings {
     bool everything;            ///< The cache's own rays: all light counts.
     const uint16_t *rows;       ///< [luxel][3][row_layers] what a first hit reads: all bounces but one. NULL: nothing (or recorded, see below).
     const uint16_t *rows_later; ///< What later hits read: all bounces but two.
+    const uint16_t *rows_direct; ///< Light straight from the sources alone: for hits too near for all light to be looked up. NULL: they get light samples.
+    const lx_rgb *albedo;       ///< [luxel], beside rows_direct.
     float near_texels;          ///< Hits nearer than so many texels of their surface are not looked up.
 } lx_gather_settings;
 

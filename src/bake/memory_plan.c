@@ -13,9 +13,10 @@ static const struct {
     uint32_t pass_ray;        // and ray of the passes: the luxel it hit,
     uint32_t extra;           // and what paths that went on found, on average
     uint32_t sum;             // estimate of the sum of all layers, how close what is around is, and by what knots the luxel is interpolated
-    uint32_t estimate;        // and layer: direct and indirect light
+    uint32_t estimate;        // and layer: direct light; indirect light as well, where before it
+    uint32_t radiosity;       // and layer, layers padded, was what passes added up to
     uint32_t met;             // and layer whose light gather rays meet: a part of its direct light
-    uint32_t row;             // and layer, layers padded: radiosity, and what two passes add to it
+    uint32_t row;             // and layer, layers padded: what two passes add, and light straight from sources
     uint32_t pass_row;        // likewise, where bounces are counted: one more pass
     // Per texel of the pages:
     uint32_t place;
@@ -30,9 +31,10 @@ static const struct {
     .pass_ray = sizeof(uint32_t),
     .extra = 40,
     .sum = 6 * sizeof(float) + sizeof(uint8_t),
-    .estimate = 2 * sizeof(lx_estimate),
+    .estimate = sizeof(lx_estimate),
+    .radiosity = 3 * sizeof(float),
     .met = sizeof(lx_estimate),
-    .row = 3 * sizeof(float) + 2 * 3 * sizeof(uint16_t),
+    .row = 3 * 3 * sizeof(uint16_t),
     .pass_row = 3 * sizeof(uint16_t),
     .place = 2 * sizeof(uint32_t),
     .tile = 4 * sizeof(double) + 1,
@@ -83,7 +85,8 @@ static uint64_t group_bytes(const lx_bake_job *job, const lx_finish *finish, uin
     const uint64_t luxels = job->map.view.count, padded = lx_row_layers(layers);
     const uint32_t workers = lx_pool_worker_count(bake->scene->context->pool);
     const bool bounces = !bake->desc.direct_only && bake->desc.transport.bounces > 0, truncated = bake->desc.transport.bounces != LX_BOUNCES_INF;
-    const uint64_t estimates = luxels * (cost.sum + (uint64_t)cost.estimate * layers) + (uint64_t)job->map.tile_count * cost.tile * layers;
+    const uint64_t radiosity = bounces ? cost.radiosity * padded : 0, indirect = (uint64_t)cost.estimate * layers;
+    const uint64_t estimates = luxels * (cost.sum + (uint64_t)cost.estimate * layers + (radiosity > indirect ? radiosity : indirect)) + (uint64_t)job->map.tile_count * cost.tile * layers;
     const uint64_t met = met_layer_count(bake) < layers ? met_layer_count(bake) : layers;
     uint64_t cache = lookup_bytes(bake) + workers * (cost.batches + cost.worker_row * padded + (uint64_t)cost.worker_cell * largest_cell_count(bake));
     cache += luxels * cost.met * met;
