@@ -38,7 +38,7 @@ static const float near_texels = 1.0f, pass_near_texels = 1.0f;
 static const double enough_energy = 1e-3; // of a layer's: what later bounces may still have added
 static const float darkest = 0.01f;      // of a layer's mean: below it errors count as if the texel were that bright
 // Variances of one look at the sky, as a share of it, from which on it is sampled besides, and four times as often.
-static const float some_sky_variance = 0.005f, much_sky_variance = 0.02f;
+static const float some_sky_variance = 0.02f, much_sky_variance = 0.1f;
 static const uint32_t cache_stream = 0x63616368;
 
 typedef struct gather_scratch {
