@@ -37,6 +37,8 @@ enum {
 static const float near_texels = 1.0f, pass_near_texels = 1.0f;
 static const double enough_energy = 1e-3; // of a layer's: what later bounces may still have added
 static const float darkest = 0.01f;      // of a layer's mean: below it errors count as if the texel were that bright
+// Variances of one look at the sky, as a share of it, from which on it is sampled besides, and four times as often.
+static const float some_sky_variance = 0.02f, much_sky_variance = 0.1f;
 static const uint32_t cache_stream = 0x63616368;
 
 typedef struct gather_scratch {
@@ -54,6 +56,8 @@ typedef struct gather_scratch {
     uint16_t place[tile_luxels];
     uint32_t luxel[tile_luxels]; // of the map
     uint8_t alone[tile_luxels];  // it sends no gather rays
+    lx_rgb sky_light[tile_luxels]; // what the cache's rays met of the sky
+    uint8_t sky_weight[tile_luxels]; // of luxels of the tile, later of targets
     uint32_t count;              // luxels of the tile that are at work
 } gather_scratch;
 
@@ -87,8 +91,10 @@ typedef struct gather_job {
     float *authored;        // [layer_count] mean channel of c
     lx_rgb *albedo;         // [luxel]
     float *closeness;       // [luxel] of what is around, 1 / m²; INFINITY: not to be interpolated
+    uint8_t *sky_weight;    // [luxel] of samples of a uniform sky against gather rays; 0: those alone look for it
     uint8_t *spacing;       // [luxel] of the knots it is interpolated from; 0: it sends gather rays
     bool interpolates;
+    bool samples_sky;       // it is of one colour
     float *radiosity;       // [luxel][3][row_layers] of all passes so far, times scale; until gathering begins it lives where `indirect` will
     uint16_t *rows[3];      // [luxel][3][row_layers] what the last pass added, what the next one will, and with a number of bounces what the pass before the last added;
                             // in the end what gather rays read
@@ -247,7 +253,7 @@ static lx_result send_pass_rays(const gather_job *g, gather_scratch *s, size_t t
             for (uint32_t k = 0; k < g->pass_rays; ++k)
                 s->starts[count++] = (lx_gather_start){.receiver = &s->sites[i * lx_site_count + k % lx_site_count],
                                                        .stream = s->stream[i] ^ cache_stream, .sample = k, .target = i};
-        const lx_gather_output out = {.sums = s->sums, .met = s->met, .distances = s->distances, .luxels = s->found, .extras = extras};
+        const lx_gather_output out = {.sums = s->sums, .met = s->met, .sky_light = s->sky_light, .distances = s->distances, .luxels = s->found, .extras = extras};
         const lx_result result = lx_gather_trace(s->batch, &settings, s->starts, count, &out, error);
         if (result != LX_OK) return result;
         for (uint32_t i = first; i < end; ++i) {
@@ -275,11 +281,53 @@ static void choose_senders(const gather_job *g, gather_scratch *s, const lx_luxe
     for (uint32_t i = 0; i < s->count; ++i) s->alone[i] = g->spacing[s->luxel[i]] > 0;
 }
 
+// How often a luxel samples a uniform sky beside its gather rays, which look for it too: by the variance of one look, as the cache's rays in the luxel and around it tell; where
+// they saw all of it or nothing, not at all. (The rays that decide are others than those that count, so nothing is lost on average.)
+static void weigh_sky(const gather_job *g, gather_scratch *s)
+{
+    enum { edge = lx_luxel_tile_edge };
+    float seen[edge + 2][edge + 2], lists[edge + 2][edge + 2];
+    memset(seen, 0, sizeof seen);
+    memset(lists, 0, sizeof lists);
+    for (uint32_t i = 0; i < s->count; ++i) {
+        const uint32_t x = s->place[i] % edge + 1, y = s->place[i] / edge + 1;
+        seen[y][x] = lx_rgb_max(s->sky_light[i]) / (LX_PI * (float)g->pass_rays);
+        lists[y][x] = 1;
+    }
+    for (uint32_t i = 0; i < s->count; ++i) {
+        float sum = 0, count = 0;
+        for (uint32_t k = 0; k < 9; ++k) {
+            const uint32_t x = s->place[i] % edge + k % 3, y = s->place[i] / edge + k / 3;
+            sum += seen[y][x];
+            count += lists[y][x];
+        }
+        const float share = sum / count, variance = share * (1 - share);
+        uint8_t weight = variance > much_sky_variance ? 4 : variance > some_sky_variance;
+        if (s->alone[i] && weight == 0) weight = 1;
+        s->sky_weight[i] = g->sky_weight[s->luxel[i]] = weight;
+    }
+}
+
+// The cache's rays met a uniform sky as if nobody else looked for it: what samples share with them is taken from their part again.
+static void share_sky(const gather_job *g, gather_scratch *s, const lx_source_use *use)
+{
+    const float unit = g->scales[use->layer] / (float)g->pass_rays;
+    for (uint32_t i = 0; i < s->count; ++i) {
+        if (s->alone[i]) continue; // their part is gone already
+        const lx_rgb taken = lx_rgb_scale(lx_rgb_mul(s->sky_light[i], use->weight), (1 - lx_uniform_sky_weight(s->sky_weight[i])) * unit);
+        float *row = s->sums + g->stride * i + use->layer;
+        row[0] -= taken.r;
+        row[g->row_layers] -= taken.g;
+        row[2 * g->row_layers] -= taken.b;
+    }
+}
+
 static void light_from_sources(const gather_job *g, gather_scratch *s)
 {
     const lx_bake_desc *desc = &g->bake->desc;
     lx_direct_bounds bounds;
-    lx_direct_tile direct = {.count = s->count, .place = s->place, .chart = s->chart, .stream = s->stream, .sites = s->sites, .alone = s->alone};
+    lx_direct_tile direct = {.count = s->count, .place = s->place, .chart = s->chart, .stream = s->stream, .sites = s->sites, .alone = s->alone,
+                             .sky_weight = s->sky_weight};
     lx_direct_find_bounds(&direct, &bounds);
     direct.bounds = &bounds;
     const lx_direct_settings settings = {.tracer = g->bake->tracer, .samples = (desc->samples + lx_direct_sites - 1) / lx_direct_sites * lx_direct_sites,
@@ -290,6 +338,7 @@ static void light_from_sources(const gather_job *g, gather_scratch *s)
         if (use->layer < 0 || (!counts && g->settings.bounces == 0)) continue;
         if (lx_pool_is_stopping(g->bake->scene->context->pool)) return;
         if (lx_direct_light(s->direct, &settings, &direct, source, s->mean, s->variance)) add_source(g, s, source, counts);
+        if (g->samples_sky && source == g->bake->source_count - 1 && g->settings.bounces > 0) share_sky(g, s, use); // the sky comes last
     }
 }
 
@@ -316,12 +365,14 @@ static lx_result light_tile(void *user, size_t task, uint32_t worker, lx_error *
     const size_t row_values = g->stride * s->count;
     memset(s->sums, 0, row_values * sizeof *s->sums);
     memset(s->alone, 0, s->count);
+    memset(s->sky_light, 0, s->count * sizeof *s->sky_light);
     const bool bounces = g->settings.bounces > 0;
-    if (bounces || g->interpolates) { // direct light must know as well
+    if (bounces || g->interpolates || g->samples_sky) { // direct light must know as well
         memset(s->met, 0, row_values * sizeof *s->met);
         const lx_result result = send_pass_rays(g, s, task, error);
         if (result != LX_OK) return result;
         choose_senders(g, s, tile);
+        if (g->samples_sky) weigh_sky(g, s);
     }
     if (bounces) {
         const float ray_unit = LX_ROW_UNIT / (float)g->pass_rays;
@@ -476,6 +527,7 @@ static size_t make_starts(const gather_job *g, gather_scratch *s, uint32_t first
         const uint32_t straight = first_site + site_count <= lx_site_count ? site_count : lx_site_count - first_site;
         place_sites(g, s, i, first_site, straight, sites);
         if (straight < site_count) place_sites(g, s, i, 0, site_count - straight, sites + straight);
+        s->sky_weight[i - first] = s->sky_weight[chunk_luxels + i - first] = g->sky_weight[s->luxel[i]];
         for (uint32_t k = 0; k < n; ++k)
             s->starts[count++] = (lx_gather_start){.receiver = &sites[k / rays_per_site % site_count], .stream = s->stream[i],
                                                    .sample = g->round_first + k, .target = (k < half ? 0u : chunk_luxels) + i - first};
@@ -571,6 +623,8 @@ static lx_result gather_tile(void *user, size_t task, uint32_t worker, lx_error 
     if (state->done) return LX_OK;
     list_luxels(g, tile, true, s);
     const uint32_t chunk = chunk_luxels;
+    lx_gather_settings settings = g->settings;
+    settings.sky_weight = s->sky_weight;
     for (uint32_t first = 0; first < s->count; first += chunk) {
         if (lx_pool_is_stopping(g->bake->scene->context->pool)) return LX_OK;
         const uint32_t end = first + chunk < s->count ? first + chunk : s->count;
@@ -578,7 +632,7 @@ static lx_result gather_tile(void *user, size_t task, uint32_t worker, lx_error 
         const size_t count = make_starts(g, s, first, end);
         if (g->met_estimates) memset(s->met, 0, 2 * chunk_luxels * g->stride * sizeof *s->met);
         const lx_gather_output out = {.sums = s->sums, .met = g->met_estimates ? s->met : NULL};
-        const lx_result result = lx_gather_trace(s->batch, &g->settings, s->starts, count, &out, error);
+        const lx_result result = lx_gather_trace(s->batch, &settings, s->starts, count, &out, error);
         if (result != LX_OK) return result;
         fold(g, state, s, task, first, end);
     }
@@ -769,7 +823,7 @@ static void release_cache(gather_job *g, uint32_t workers)
     }
     for (uint32_t t = 0; g->extras && t < g->job->map.tile_count; ++t) lx_free(g->extras[t].items);
     void **arrays[] = {(void **)&g->scratch, (void **)&g->extras, (void **)&g->albedo, (void **)&g->rows[0], (void **)&g->rows[1],
-                       (void **)&g->rows[2], (void **)&g->rows_direct, (void **)&g->hits, (void **)&g->met_estimates, (void **)&g->closeness, (void **)&g->spacing};
+                       (void **)&g->rows[2], (void **)&g->rows_direct, (void **)&g->hits, (void **)&g->met_estimates, (void **)&g->closeness, (void **)&g->spacing, (void **)&g->sky_weight};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) {
         lx_free(*arrays[i]);
         *arrays[i] = NULL;
@@ -819,6 +873,7 @@ static lx_result allocate(gather_job *g, lx_error *error)
     g->albedo = lx_calloc_array(cached, sizeof *g->albedo);
     g->closeness = lx_calloc_array(luxels, sizeof *g->closeness);
     g->spacing = lx_calloc_array(luxels, sizeof *g->spacing);
+    g->sky_weight = lx_calloc_array(luxels, sizeof *g->sky_weight);
     for (int i = 0; i < 3; ++i) g->rows[i] = lx_calloc_array(i < 2 || is_truncated(g) ? cached : 0, g->stride * sizeof *g->rows[i]);
     g->rows_direct = lx_calloc_array(cached, g->stride * sizeof *g->rows_direct);
     g->hits = lx_malloc_array(cached, g->pass_rays * sizeof *g->hits);
@@ -836,7 +891,7 @@ static lx_result allocate(gather_job *g, lx_error *error)
     g->layer_means = lx_calloc_array(layers, sizeof *g->layer_means);
     g->halvings = lx_calloc_array(tiles, layers * sizeof *g->halvings);
     g->gain = lx_malloc_array(layers, sizeof *g->gain);
-    if (!g->scales || !g->authored || !g->albedo || !g->closeness || !g->spacing || !g->rows[0] || !g->rows[1] || !g->rows[2] || !g->rows_direct || !g->hits || !g->extras || !g->direct || !g->indirect ||
+    if (!g->scales || !g->authored || !g->albedo || !g->closeness || !g->spacing || !g->sky_weight || !g->rows[0] || !g->rows[1] || !g->rows[2] || !g->rows_direct || !g->hits || !g->extras || !g->direct || !g->indirect ||
         !g->pass_change || !g->pass_energy || !g->converged || !g->tiles || !g->layer_means || !g->halvings || !g->gain)
         return lx_fail_memory(error, "layers; --memory bakes them in groups");
     for (size_t l = 0; l < layers; ++l) g->gain[l] = 1;
@@ -920,13 +975,6 @@ static lx_result choose_answers(gather_job *g, lx_error *error)
     return LX_OK;
 }
 
-// A uniform sky has no samples: every luxel's own rays must look for it.
-static bool has_unsampled_sky(const lx_bake *bake)
-{
-    const lx_tracer *tracer = bake->tracer;
-    return tracer->sky.present && !lx_sky_has_samples(&tracer->sky) && bake->uses[tracer->source_count - 1].layer >= 0;
-}
-
 // Bakes layers first … first + count - 1. `uses`: [source_count] room for their uses.
 static lx_result bake_group(lx_bake_job *job, uint32_t first, uint32_t count, lx_source_use *uses, sum_estimate *sums, lx_finish *finish,
                             double deadline, lx_error *error)
@@ -946,7 +994,8 @@ static lx_result bake_group(lx_bake_job *job, uint32_t first, uint32_t count, lx
                     .luxel_count = job->map.view.count, .pass_rays = samples < 128 ? 16 : most_pass_rays};
     g.stride = 3 * (size_t)g.row_layers;
     g.settings.bounces = bounces;
-    g.interpolates = bake->desc.interpolation > 0 && !has_unsampled_sky(bake);
+    g.interpolates = bake->desc.interpolation > 0;
+    g.samples_sky = lx_sky_is_uniform(&bake->tracer->sky) && uses[bake->source_count - 1].layer >= 0;
     LX_TRY(allocate(&g, error));
     LX_TRY(allocate_met(&g, error));
     find_authored(&g);

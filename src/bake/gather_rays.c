@@ -123,8 +123,11 @@ static void add_sky(const lx_gather_settings *settings, const lx_gather_output *
     if (!tracer->sky.present) return;
     const lx_source_use *use = &settings->uses[tracer->source_count - 1]; // the sky comes last
     if (!counts(settings, use, vertex)) return;
-    const float weight = lx_sky_weight(tracer, direction, cosine);
-    add_light(settings, out, vertex, target, use, 0, lx_rgb_scale(lx_rgb_mul(throughput, lx_sky_radiance(&tracer->sky, direction)), LX_PI * weight));
+    const uint32_t samples = settings->sky_weight ? settings->sky_weight[target] : 0;
+    const float weight = vertex == 0 ? lx_direct_sky_weight(tracer, direction, cosine, samples) : lx_sky_weight(tracer, direction, cosine);
+    const lx_rgb light = lx_rgb_scale(lx_rgb_mul(throughput, lx_sky_radiance(&tracer->sky, direction)), LX_PI);
+    if (vertex == 0 && out->sky_light) out->sky_light[target] = lx_rgb_add(out->sky_light[target], light);
+    add_light(settings, out, vertex, target, use, 0, lx_rgb_scale(light, weight));
 }
 
 static void add_emission(const lx_gather_settings *settings, const lx_gather_output *out, const flight *f, const lx_ray *ray, const lx_hit *hit,

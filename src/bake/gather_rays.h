@@ -24,6 +24,7 @@ typedef struct lx_gather_settings {
     const uint16_t *rows_later; ///< What later hits read: all bounces but two.
     const uint16_t *rows_direct; ///< Light straight from the sources alone: for hits too near for all light to be looked up. NULL: they get light samples.
     const lx_rgb *albedo;       ///< [luxel], beside rows_direct.
+    const uint8_t *sky_weight;  ///< [target] samples that share the light of a uniform sky with a first ray (lx_direct_tile). NULL: none do.
     float near_texels;          ///< Hits nearer than so many texels of their surface are not looked up.
 } lx_gather_settings;
 
@@ -48,6 +49,7 @@ typedef struct lx_gather_extras {
 typedef struct lx_gather_output {
     float *sums;             ///< [target][3][row_layers], added to.
     float *met;              ///< Likewise, what the first rays themselves meet of light sources. NULL: that goes to `sums` too.
+    lx_rgb *sky_light;       ///< [target] added to: what first rays meet of the sky, without weight. NULL: not wanted.
     float *distances;        ///< [start] to the first hit; INFINITY: none. NULL: not wanted.
     uint32_t *luxels;        ///< Recording (no rows are read): [start] luxel that the first hit may be looked up at, else LX_NO_LUXEL. NULL: rows are added.
     lx_gather_extras *extras; ///< Recording: later hits.

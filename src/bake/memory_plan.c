@@ -12,7 +12,7 @@ static const struct {
     uint32_t albedo;
     uint32_t pass_ray;        // and ray of the passes: the luxel it hit,
     uint32_t extra;           // and what paths that went on found, on average
-    uint32_t sum;             // estimate of the sum of all layers, how close what is around is, and by what knots the luxel is interpolated
+    uint32_t sum;             // estimate of the sum of all layers, how close what is around is, by what knots the luxel is interpolated, and whether the sky is sampled
     uint32_t estimate;        // and layer: direct light; indirect light as well, where before it
     uint32_t radiosity;       // and layer, layers padded, was what passes added up to
     uint32_t met;             // and layer whose light gather rays meet: a part of its direct light
@@ -30,7 +30,7 @@ static const struct {
     .albedo = sizeof(lx_rgb),
     .pass_ray = sizeof(uint32_t),
     .extra = 40,
-    .sum = 6 * sizeof(float) + sizeof(uint8_t),
+    .sum = 6 * sizeof(float) + 2 * sizeof(uint8_t),
     .estimate = sizeof(lx_estimate),
     .radiosity = 3 * sizeof(float),
     .met = sizeof(lx_estimate),

@@ -11,6 +11,9 @@
 // Where `noise` is given, the number of samples grows fourfold at a time, and a luxel that is sure enough of its light needs no more; where the source gives
 // next to nothing, little is enough.
 //
+// A uniform sky is no lamp: nearly all luxels see a part of it, and in a room its last hundredth may be all the light there is. No looks are taken; how many samples a luxel
+// takes is for others to say (lx_direct_tile.sky_weight).
+//
 // A luxel's samples are cut into four runs. Each is a well-spread set in itself, and what they disagree by tells the variance of their mean; but together they are spread still
 // better, so it tells too much. How much is seen from pairs of runs that disagree less than runs do, over all luxels of the tile (see gain_of).
 #include "trace/direct.h"
@@ -88,8 +91,9 @@ typedef struct job {
     const lx_tracer *tracer;
     const lx_direct_tile *tile;
     uint32_t source, key, cells, weight;
-    uint32_t samples; // of a luxel, at most
+    uint32_t samples; // of a luxel, at most (of a uniform sky, times its weight there)
     uint32_t first_samples; // of which so many come first, then four times as many, and so on
+    bool is_uniform_sky;
     bool has_views;
     uint32_t viewed; // luxel that the view is of; most_luxels: none yet
     spread even, shadowed; // of luxels whose shadows are known, and of others
@@ -127,10 +131,20 @@ uint64_t lx_direct_batch_rays(const lx_direct_batch *b)
     return b->ray_count;
 }
 
+static bool is_uniform_sky(const lx_tracer *tracer, uint32_t source)
+{
+    return lx_tracer_source(tracer, source)->kind == LX_SOURCE_SKY && lx_sky_is_uniform(&tracer->sky);
+}
+
 uint32_t lx_direct_sample_weight(const lx_tracer *tracer, uint32_t source)
 {
     const uint32_t wanted = (lx_tracer_cell_count(tracer, source) + cells_per_share - 1) / cells_per_share;
     return wanted < most_monitor_share ? wanted : most_monitor_share;
+}
+
+float lx_direct_sky_weight(const lx_tracer *tracer, lx_vec3 direction, float cosine, uint32_t count)
+{
+    return lx_sky_is_uniform(&tracer->sky) ? lx_uniform_sky_weight(count) : lx_sky_weight(tracer, direction, cosine);
 }
 
 // ---- tiles and sources --------------------------------------------------------------------------------------------------------
@@ -198,6 +212,16 @@ static bool is_sharp(const lx_tracer *tracer, uint32_t source)
 
 // ---- samples ------------------------------------------------------------------------------------------------------------------
 
+static uint32_t weight_at(const job *j, uint32_t luxel)
+{
+    return j->is_uniform_sky && j->tile->sky_weight ? j->tile->sky_weight[luxel] : j->weight;
+}
+
+static uint32_t most_samples(const job *j, uint32_t luxel)
+{
+    return j->samples / j->weight * weight_at(j, luxel);
+}
+
 // The first samples ask the source itself, further ones a view of it: most luxels that it reaches take enough of them for that.
 static bool take_sample(job *j, uint32_t luxel, uint32_t i, lx_ray *ray, lx_rgb *light, uint32_t *cell)
 {
@@ -205,7 +229,11 @@ static bool take_sample(job *j, uint32_t luxel, uint32_t i, lx_ray *ray, lx_rgb 
     if (lx_source_bound(j->tracer, j->source, site) == 0) return false;
     j->b->luxels[luxel].possible = true;
     const lx_vec2 u = lx_sobol_pair(i, lx_hash_combine(j->tile->stream[luxel], j->key));
-    const uint32_t weight = j->tile->alone && j->tile->alone[luxel] ? 0 : j->weight;
+    const uint32_t weight = j->tile->alone && j->tile->alone[luxel] ? 0 : weight_at(j, luxel);
+    if (j->is_uniform_sky) {
+        *cell = 0;
+        return lx_sample_uniform_sky(j->tracer, site, u, weight, ray, light);
+    }
     if (!j->has_views || i < probes) return lx_sample_source(j->tracer, j->source, site, u, weight, ray, light, cell);
     if (j->viewed != luxel) lx_source_view_fill(&j->b->view, j->tracer, j->source, sites, lx_direct_sites);
     j->viewed = luxel;
@@ -427,7 +455,7 @@ static void add_unshadowed(job *j, uint32_t luxel, uint32_t first, uint32_t end,
 static void sum_evenly_lit(job *j, uint32_t luxel, lx_rgb *mean, float *variance)
 {
     clear_sums(j, 1);
-    uint32_t samples = j->samples;
+    uint32_t samples = most_samples(j, luxel);
     if (j->cells == 1 && samples > lx_direct_sites) {
         samples = lx_direct_sites;
         add_unshadowed(j, luxel, 0, samples, samples);
@@ -436,7 +464,7 @@ static void sum_evenly_lit(job *j, uint32_t luxel, lx_rgb *mean, float *variance
         const float fine = lx_max(fine_deviation, unshadowed_share * j->noise), bright = lx_max(all, j->least);
         if (variance_of_mean(j->b->run_sums[0], runs / (float)samples) > fine * fine * bright * bright) {
             clear_sums(j, 1);
-            samples = j->samples;
+            samples = most_samples(j, luxel);
             add_unshadowed(j, luxel, 0, samples, samples);
         }
     } else {
@@ -481,7 +509,9 @@ static bool is_sure(const job *j, uint32_t slot, uint32_t samples)
 {
     const lx_rgb sum = j->b->sums[slot];
     const float mean = (sum.r + sum.g + sum.b) * (1.0f / 3) / (float)samples, allowed = shadowed_share * j->noise * lx_max(mean, j->least);
-    return variance_of_mean(j->b->run_sums[slot], runs / (float)samples) <= allowed * allowed;
+    const float variance = variance_of_mean(j->b->run_sums[slot], runs / (float)samples);
+    if (j->is_uniform_sky && !(variance > 0)) return false; // samples that all saw sky, or none, know nothing of the little that they missed
+    return variance <= allowed * allowed;
 }
 
 // The listed luxels by rays of their samples: all of them, or as many as make them sure enough.
@@ -497,7 +527,7 @@ static void sum_shadowed(job *j, const uint16_t *list, uint32_t list_count, lx_r
         uint32_t left = 0;
         for (uint32_t s = 0; s < count; ++s) {
             const uint32_t slot = slots[s];
-            if (end == j->samples || is_sure(j, slot, end)) {
+            if (end == most_samples(j, list[slot]) || is_sure(j, slot, end)) {
                 store(j, &j->shadowed, list[slot], slot, end, (lx_rgb){1, 1, 1}, mean, variance);
                 continue;
             }
@@ -521,13 +551,14 @@ bool lx_direct_light(lx_direct_batch *b, const lx_direct_settings *settings, con
     j.samples = is_sharp(tracer, source) ? (uint32_t)lx_direct_sites : settings->samples * j.weight;
     j.first_samples = j.samples;
     j.has_views = lx_source_has_views(tracer, source);
+    j.is_uniform_sky = is_uniform_sky(tracer, source);
     j.viewed = most_luxels;
     j.noise = settings->noise;
     j.least = darkest * 20 * tracer->source_scales[source]; // which are a twentieth of the mean
     // A monitor's cells must each be sure; and without a bound nothing ends early.
     while (j.cells == 1 && j.noise > 0 && j.first_samples % runs == 0 && j.first_samples / runs >= lx_direct_sites) j.first_samples /= runs;
     memset(b->luxels, 0, tile->count * sizeof *b->luxels);
-    if (!settings->all_rays) {
+    if (!settings->all_rays && !j.is_uniform_sky) {
         place_on_grid(b, tile);
         look_where_it_matters(&j);
     }
@@ -546,6 +577,7 @@ bool lx_direct_light(lx_direct_batch *b, const lx_direct_settings *settings, con
             continue;
         }
         if (!s->possible && s->looked == lx_direct_sites) continue; // behind every site's horizon
+        if (weight_at(&j, i) == 0) continue;
         b->list[count++] = (uint16_t)i;
     }
     for (uint32_t first = 0; first < count; first += chunk)

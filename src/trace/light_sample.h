@@ -15,9 +15,16 @@ typedef struct lx_receiver {
 /// One sample of the irradiance that source `source` (of strength 1 and white colour) would give without occluders, and the shadow ray
 /// that decides. Range, spot cone, receiver's cosine, 1/pdf and, for sources that rays can hit (emissive surfaces, pictures of
 /// skies), the power-heuristic weight against cosine-weighted rays are in it; `count`: how many such samples share the work against one ray
-/// (the caller averages them); 0: no ray meets the source, samples bring all its light (uniform skies have no samples). `out_cell`: of the sampled point, see lx_tracer_cell_at. False: nothing arrives, no ray.
+/// (the caller averages them); 0: no ray meets the source, samples bring all its light. `out_cell`: of the sampled point, see lx_tracer_cell_at. False: nothing arrives, no ray.
+/// A uniform sky has no samples here: the ray that goes on from a vertex meets it just as well. Where many samples of one receiver are taken,
+/// lx_sample_uniform_sky has some.
 bool lx_sample_source(const lx_tracer *tracer, uint32_t source, const lx_receiver *receiver, lx_vec2 u, uint32_t count, lx_ray *out_ray,
                       lx_rgb *out_irradiance, uint32_t *out_cell);
+
+/// One cosine-weighted sample of a uniform sky, else as lx_sample_source; its density is that of gather rays, so the weight is the same for all directions.
+bool lx_sample_uniform_sky(const lx_tracer *tracer, const lx_receiver *receiver, lx_vec2 u, uint32_t count, lx_ray *out_ray, lx_rgb *out_irradiance);
+/// Weight of a cosine-weighted ray that met a uniform sky, against `count` samples of lx_sample_uniform_sky; 1 without any.
+float lx_uniform_sky_weight(uint32_t count);
 
 enum { lx_view_receivers = 16 };
 
@@ -51,7 +58,7 @@ float lx_light_roulette(uint32_t stream, uint32_t sample, uint32_t key, float br
 /// Weight of an emissive hit found by a cosine-weighted ray from `receiver`, against `count` samples of lx_sample_source. `cosine`: of the
 /// ray at the receiver.
 float lx_hit_weight(const lx_tracer *tracer, const lx_ray *ray, const lx_hit *hit, lx_vec3 hit_normal, float cosine, uint32_t count);
-/// The same for a ray that left the scene. `direction` is unit.
+/// The same for a ray that left the scene, against one sample. `direction` is unit. A uniform sky: 1.
 float lx_sky_weight(const lx_tracer *tracer, lx_vec3 direction, float cosine);
 
 /// Smooth cut-off at a light's range (KHR_lights_punctual): clamp(1 - (d / range)^4, 0, 1); range 0: 1.

@@ -172,6 +172,11 @@ bool lx_sky_has_samples(const lx_sky *sky)
     return sky->present && sky->image.width != 0;
 }
 
+bool lx_sky_is_uniform(const lx_sky *sky)
+{
+    return sky->present && sky->image.width == 0;
+}
+
 // Largest i with cdf[i] <= u, i < count; u is rescaled to its place within the step.
 static uint32_t find_step(const float *cdf, uint32_t count, float *u)
 {

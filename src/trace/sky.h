@@ -22,6 +22,8 @@ void lx_sky_release(lx_sky *sky);
 lx_rgb lx_sky_radiance(const lx_sky *sky, lx_vec3 direction);
 /// True if sampling by brightness is worth a ray of its own; one colour is best met by cosine-weighted rays.
 bool lx_sky_has_samples(const lx_sky *sky);
+/// True if it is there and of one colour.
+bool lx_sky_is_uniform(const lx_sky *sky);
 /// pdf_solid_angle is written.
 lx_vec3 lx_sky_sample(const lx_sky *sky, lx_vec2 u, float *pdf_solid_angle);
 float lx_sky_pdf(const lx_sky *sky, lx_vec3 direction);

@@ -157,6 +157,37 @@ def texels_at_the_foot_of_a_wall_see_half_the_sky():
 
 
 @both
+def texels_in_the_open_hold_all_the_sky():
+    scene, size = Gltf(), (3.0, 2.0)
+    floor_scene(scene, size)
+    baked = bake(scene, "out", 32, 64, 0, "--sky", "2,2,2")
+    expected, got = floor_texels(baked, "sky", size, (0, 0, 0), lambda p, n: math.pi, UP)
+    compare("each texel", grey(expected), got, 1e-5, 64)
+
+
+@both
+def texels_below_a_ceiling_see_the_sky_through_its_hole():
+    scene, size, height = Gltf(), (4.0, 2.0), 0.8
+    floor_scene(scene, size)
+    dark = scene.add_material("dark", base_color=(0, 0, 0), double_sided=True, unlit=True)
+    far, x0, x1, z0, z1 = 1000.0, -1.3, -0.4, -0.5, 0.6
+    for k, (a, b, c, d) in enumerate(((-far, x0, -far, far), (x1, far, -far, far), (x0, x1, -far, z0), (x0, x1, z1, far))):
+        part = quad(b - a, d - c).rotate((1, 0, 0), -90).translate((a + b) / 2, height, (c + d) / 2)
+        scene.add_node("ceiling %d" % k, mesh=scene.add_mesh("ceiling %d" % k, (part, dark)))
+    hole = oracle.rectangle(((x0 + x1) / 2, height, (z0 + z1) / 2), ((x1 - x0) / 2, 0, 0), (0, 0, (z1 - z0) / 2))
+
+    def light(p, n):
+        return math.pi * oracle.polygon(hole, p, n)
+    # All the way from a fifth of the sky below the hole to less than a hundredth of it at the other end.
+    baked = bake(scene, "out", 48, 1024, 0, "--sky", "2,2,2")
+    expected, got = floor_texels(baked, "sky", size, (0, 0, 0), light, UP)
+    compare_mean("mean of the floor", math.fsum(expected) / len(expected), [g[0] for g in got], 3e-3, 1024)
+    dim = [k for k, e in enumerate(expected) if e < 0.05 * max(expected)]
+    compare_mean("mean of where it is dim", math.fsum(expected[k] for k in dim) / len(dim), [got[k][0] for k in dim], 0.02, 1024)
+    expect(len(dim) > 100, "%d texels are dim" % len(dim))
+
+
+@both
 def texels_of_a_furnace_all_reach_its_geometric_sum():
     scene = Gltf()
     wall = scene.add_material("wall", base_color=(0.5, 0.5, 0.5), emissive=(1, 1, 1), strength=5)

@@ -39,6 +39,7 @@ typedef struct fixture {
     lx_receiver sites[luxels * lx_direct_sites];
     uint16_t place[luxels];
     uint32_t chart[luxels], stream[luxels];
+    uint8_t flags[luxels];
     lx_direct_tile tile;
 } fixture;
 
@@ -51,7 +52,7 @@ static void begin(fixture *f, uint32_t seed)
     *f = (fixture){.scene = import_members(members)};
     bool *cells = calloc(f->scene->source_count, sizeof *cells);
     for (uint32_t i = 0; i < f->scene->source_count; ++i) cells[i] = f->scene->sources[i].columns > 0;
-    const lx_transport_desc transport = {.bounces = 0, .seed = 1};
+    const lx_transport_desc transport = {.bounces = 0, .seed = 1, .sky = {.color = {1, 1, 1}, .intensity = 1}};
     assert_int_equal(lx_tracer_create(f->scene, &transport, false, cells, &f->tracer, NULL), LX_OK);
     free(cells);
     f->batch = lx_direct_batch_create(f->tracer);
@@ -77,6 +78,7 @@ static void end(fixture *f)
 
 static uint32_t source_number(const fixture *f, const char *name)
 {
+    if (strcmp(name, "sky") == 0) return f->scene->source_count;
     return (uint32_t)(source_named(f->scene, name) - f->scene->sources);
 }
 
@@ -91,7 +93,13 @@ static void brute_force(const fixture *f, uint32_t source, uint32_t luxel, doubl
         lx_ray ray;
         lx_rgb light, transmittance;
         uint32_t cell;
-        if (!lx_sample_source(f->tracer, source, &f->sites[luxel * lx_direct_sites + i % lx_direct_sites], u, count, &ray, &light, &cell)) continue;
+        const lx_receiver *site = &f->sites[luxel * lx_direct_sites + i % lx_direct_sites];
+        if (source == f->scene->source_count) {
+            if (!lx_sample_uniform_sky(f->tracer, site, u, count, &ray, &light)) continue;
+            cell = 0;
+        } else if (!lx_sample_source(f->tracer, source, site, u, count, &ray, &light, &cell)) {
+            continue;
+        }
         lx_trace_transmittance(f->tracer, &ray, &transmittance, 1);
         const double value = (double)(light.g * transmittance.g);
         sum[cell] += value;
@@ -151,6 +159,85 @@ static void source_below_the_horizon_gives_nothing_without_a_ray(void **state)
     const lx_direct_settings settings = {.tracer = f.tracer, .samples = samples};
     assert_false(lx_direct_light(f.batch, &settings, &f.tile, source_number(&f, "below"), mean, variance));
     assert_true(lx_direct_batch_rays(f.batch) == 0);
+    end(&f);
+}
+
+static void uniform_skies_give_what_brute_force_does(void **state) { (void)state; check_source("sky"); }
+
+// Samples and rays that miss everything share the light of a uniform sky: what the one lacks of it the other has, by whatever number of samples. Where rays or
+// samples are alone they have all.
+static void samples_and_rays_share_all_light_of_a_uniform_sky(void **state)
+{
+    (void)state;
+    fixture f;
+    begin(&f, 1);
+    const uint32_t source = source_number(&f, "sky");
+    for (uint32_t i = 0; i < luxels * lx_direct_sites; ++i) f.sites[i].position.y += 10; // above everything
+    static const uint8_t counts[] = {0, 1, 4};
+    uint8_t alone[luxels];
+    for (uint32_t i = 0; i < luxels; ++i) {
+        f.flags[i] = counts[i % 3];
+        alone[i] = i % 3 > 0 && i % 2;
+    }
+    lx_rgb mean[luxels];
+    float variance[luxels];
+    const lx_direct_settings settings = {.tracer = f.tracer, .samples = samples};
+    const lx_vec3 up = {0, 1, 0};
+    const float ray = lx_direct_sky_weight(f.tracer, up, 1, 1), ray_of_4 = lx_direct_sky_weight(f.tracer, up, 1, 4);
+    assert_true(ray > ray_of_4 && ray < 1 && ray_of_4 > 0 && lx_direct_sky_weight(f.tracer, up, 1, 0) == 1);
+    assert_true(lx_direct_light(f.batch, &settings, &f.tile, source, mean, variance));
+    for (uint32_t i = 0; i < luxels; ++i) assert_near((double)(mean[i].g + ray * LX_PI), (double)LX_PI, 1e-5);
+    f.tile.sky_weight = f.flags;
+    f.tile.alone = alone;
+    const uint64_t before = lx_direct_batch_rays(f.batch);
+    assert_true(lx_direct_light(f.batch, &settings, &f.tile, source, mean, variance));
+    for (uint32_t i = 0; i < luxels; ++i) {
+        const float rays_bring = alone[i] ? 0 : lx_direct_sky_weight(f.tracer, up, 1, f.flags[i]);
+        assert_near((double)(mean[i].g + rays_bring * LX_PI), (double)LX_PI, 1e-5);
+    }
+    assert_int_equal(lx_direct_batch_rays(f.batch) - before, samples * (33 * 1 + 33 * 4)); // 34 luxels take none
+    end(&f);
+}
+
+// At later vertices of a path the ray that goes on has it all.
+static void paths_take_no_samples_of_a_uniform_sky(void **state)
+{
+    (void)state;
+    fixture f;
+    begin(&f, 1);
+    lx_ray ray;
+    lx_rgb light;
+    uint32_t cell;
+    assert_false(lx_sample_source(f.tracer, source_number(&f, "sky"), &f.sites[0], (lx_vec2){0.3f, 0.6f}, 1, &ray, &light, &cell));
+    assert_true(lx_sky_weight(f.tracer, (lx_vec3){0, 1, 0}, 1) == 1);
+    end(&f);
+}
+
+// A chink that few rays find: its light must not be taken for none.
+static void a_sliver_of_sky_is_not_lost(void **state)
+{
+    (void)state;
+    fixture f;
+    begin(&f, 1);
+    for (uint32_t i = 0; i < luxels * lx_direct_sites; ++i) { // close below the shade, which is 2 × 3 m
+        lx_vec3 *p = &f.sites[i].position;
+        *p = (lx_vec3){1 + 0.1f * p->x, 0.9f, -1.5f + 0.1f * p->z};
+    }
+    const uint32_t source = source_number(&f, "sky");
+    lx_rgb mean[luxels];
+    float variance[luxels];
+    const lx_direct_settings settings = {.tracer = f.tracer, .samples = samples};
+    assert_true(lx_direct_light(f.batch, &settings, &f.tile, source, mean, variance));
+    double sum = 0, expected_sum = 0, sum_variance = 0;
+    for (uint32_t i = 0; i < luxels; ++i) {
+        double expected[most_cells], spread[most_cells];
+        brute_force(&f, source, i, expected, spread);
+        sum += (double)mean[i].g;
+        expected_sum += expected[0];
+        sum_variance += spread[0] * (1.0 / samples + 1.0 / brute_samples);
+    }
+    assert_true(expected_sum > 0.001 * luxels && expected_sum < 0.05 * luxels);
+    assert_near(sum, expected_sum, 4 * sqrt(sum_variance));
     end(&f);
 }
 
@@ -246,6 +333,10 @@ int main(void)
         cmocka_unit_test(emissive_surfaces_give_what_brute_force_does),
         cmocka_unit_test(emissive_meshes_give_what_brute_force_does),
         cmocka_unit_test(cells_of_monitors_give_what_brute_force_does),
+        cmocka_unit_test(uniform_skies_give_what_brute_force_does),
+        cmocka_unit_test(samples_and_rays_share_all_light_of_a_uniform_sky),
+        cmocka_unit_test(paths_take_no_samples_of_a_uniform_sky),
+        cmocka_unit_test(a_sliver_of_sky_is_not_lost),
         cmocka_unit_test(source_below_the_horizon_gives_nothing_without_a_ray),
         cmocka_unit_test(rays_are_spared_where_neighbours_agree),
         cmocka_unit_test(bounds_of_the_tile_change_nothing),
