@@ -34,7 +34,7 @@ enum {
     most_monitor_share = 16, cells_per_share = 4,
 };
 
-// Unshadowed light whose mean varies by more, of itself, is looked at in all samples instead of the first 16.
+// Unshadowed light whose mean varies by more, of itself, is looked at in four times as many samples, from 16 on.
 static const float fine_deviation = 0.004f;
 
 // Shares of the noise that is wanted which light straight from one source may have, where shadows fall and where none do.
@@ -452,23 +452,33 @@ static void add_unshadowed(job *j, uint32_t luxel, uint32_t first, uint32_t end,
     }
 }
 
+// What were four runs is the first of the next four.
+static void join_runs(float sums[runs])
+{
+    sums[0] += sums[1] + sums[2] + sums[3];
+    sums[1] = sums[2] = sums[3] = 0;
+}
+
+// Is the unshadowed mean of so many samples fine enough?
+static bool is_fine(const job *j, uint32_t samples)
+{
+    const lx_rgb sum = j->b->sums[0];
+    const float all = (sum.r + sum.g + sum.b) * (1.0f / 3) / (float)samples;
+    const float fine = lx_max(fine_deviation, unshadowed_share * j->noise), bright = lx_max(all, j->least);
+    return variance_of_mean(j->b->run_sums[0], runs / (float)samples) <= fine * fine * bright * bright;
+}
+
 static void sum_evenly_lit(job *j, uint32_t luxel, lx_rgb *mean, float *variance)
 {
+    const uint32_t most = most_samples(j, luxel);
+    uint32_t samples = most, done = 0;
     clear_sums(j, 1);
-    uint32_t samples = most_samples(j, luxel);
-    if (j->cells == 1 && samples > lx_direct_sites) {
-        samples = lx_direct_sites;
-        add_unshadowed(j, luxel, 0, samples, samples);
-        const lx_rgb sum = j->b->sums[0];
-        const float all = (sum.r + sum.g + sum.b) * (1.0f / 3) / (float)samples;
-        const float fine = lx_max(fine_deviation, unshadowed_share * j->noise), bright = lx_max(all, j->least);
-        if (variance_of_mean(j->b->run_sums[0], runs / (float)samples) > fine * fine * bright * bright) {
-            clear_sums(j, 1);
-            samples = most_samples(j, luxel);
-            add_unshadowed(j, luxel, 0, samples, samples);
-        }
-    } else {
-        add_unshadowed(j, luxel, 0, samples, samples);
+    while (j->cells == 1 && samples % runs == 0 && samples / runs >= lx_direct_sites) samples /= runs;
+    for (;; samples *= runs) {
+        add_unshadowed(j, luxel, done, samples, samples);
+        if (samples == most || is_fine(j, samples)) break;
+        join_runs(j->b->run_sums[0]);
+        done = samples;
     }
     store(j, &j->even, luxel, 0, samples, j->b->luxels[luxel].transmittance, mean, variance);
 }
@@ -531,9 +541,7 @@ static void sum_shadowed(job *j, const uint16_t *list, uint32_t list_count, lx_r
                 store(j, &j->shadowed, list[slot], slot, end, (lx_rgb){1, 1, 1}, mean, variance);
                 continue;
             }
-            float *sums = b->run_sums[slot]; // what were four runs is the first of the next four
-            sums[0] += sums[1] + sums[2] + sums[3];
-            sums[1] = sums[2] = sums[3] = 0;
+            join_runs(b->run_sums[slot]);
             slots[left++] = (uint8_t)slot;
         }
         count = left;
