@@ -12,7 +12,8 @@
 
 enum {
     batch_size = lx_gather_batch_size,
-    look_ahead = 24,        // rows that are fetched before they are added
+    look_ahead = 24,       // rows that are fetched before they are added
+    triangles_ahead = 16,  // of the lookup, before they are read
     near_until = 4,        // vertices; paths caught in a corner are looked up all the same
     most_passes = 256,     // surfaces one ray may pass through
 };
@@ -62,7 +63,11 @@ struct lx_gather_batch {
     lx_shading shading[2 * batch_size];
     size_t slow_count;
     // Rays of the second loop that are still to be traced.
-    lx_ray onward_rays[2 * batch_size];
+    lx_hit near_hits[2 * batch_size]; // they leave from here,
+    flight near[2 * batch_size];
+    lx_receiver near_receivers[2 * batch_size];
+    size_t near_count;
+    lx_ray onward_rays[2 * batch_size]; // and these are on their way
     flight onward[2 * batch_size];
     size_t onward_count;
     slow_row slow_rows[2 * batch_size];
@@ -228,11 +233,16 @@ static void leave_near(lx_gather_batch *b, const lx_gather_settings *settings, f
 {
     note_row(b, settings->rows_direct, settings, &f, luxel);
     if (!survives(&f, settings->albedo[luxel])) return;
-    lx_receiver r;
-    lx_hit_geometry(settings->tracer, hit, &r.position, &r.geometric_normal);
-    r.normal = lx_normal_at(settings->tracer, hit->surface, hit->triangle, hit->u, hit->v);
     f.is_lit = true;
-    go_on(b, &r, f);
+    b->near_hits[b->near_count] = *hit;
+    b->near[b->near_count++] = f;
+}
+
+static void leave_all_near(lx_gather_batch *b, const lx_gather_settings *settings)
+{
+    lx_hit_receivers(settings->tracer, b->near_hits, b->near_receivers, b->near_count);
+    for (size_t i = 0; i < b->near_count; ++i) go_on(b, &b->near_receivers[i], b->near[i]);
+    b->near_count = 0;
 }
 
 // ---- the first loop ----------------------------------------------------------------------------------------------------------------
@@ -311,6 +321,13 @@ static void add_rows(lx_gather_batch *b, const lx_gather_settings *settings, con
     }
 }
 
+static void fetch_triangle(const lx_lookup *lookup, const lx_hit *hit)
+{
+    if (hit->surface == LX_MISS) return;
+    const lx_lookup_triangle *triangles = lookup->surfaces[hit->surface].triangles;
+    if (triangles) __builtin_prefetch(triangles + hit->triangle);
+}
+
 static void first_hits(lx_gather_batch *b, const lx_gather_settings *settings, const lx_gather_start *starts, size_t count, uint32_t first_start,
                        const lx_gather_output *out)
 {
@@ -323,6 +340,7 @@ static void first_hits(lx_gather_batch *b, const lx_gather_settings *settings, c
     for (size_t i = 0; i < made; ++i) {
         const lx_hit *hit = &b->hits[i];
         const lx_gather_start *start = &starts[b->found[i]];
+        if (i + triangles_ahead < made) fetch_triangle(settings->lookup, hit + triangles_ahead);
         if (hit->surface == LX_MISS) {
             add_sky(settings, out, (lx_rgb){1, 1, 1}, b->cosines[i], start->target, b->rays[i].direction, 0);
             continue;
@@ -364,6 +382,7 @@ static void first_hits(lx_gather_batch *b, const lx_gather_settings *settings, c
     }
     if (settings->rows && !out->luxels) add_rows(b, settings, out, found_count);
     add_slow_rows(b, settings, out);
+    leave_all_near(b, settings);
 }
 
 // ---- the second loop -----------------------------------------------------------------------------------------------------------------
@@ -545,6 +564,7 @@ static lx_result step(lx_gather_batch *b, const lx_gather_settings *settings, co
     }
     add_slow_rows(b, settings, out);
     next_events(b, settings, vertex_count, out);
+    leave_all_near(b, settings);
     for (size_t i = 0; i < vertex_count; ++i) go_on(b, &b->vertices[i].receiver, b->vertices[i].flight);
     memcpy(b->slow_rays + kept, b->onward_rays, b->onward_count * sizeof *b->slow_rays);
     memcpy(b->flights + kept, b->onward, b->onward_count * sizeof *b->flights);
@@ -560,7 +580,7 @@ lx_result lx_gather_trace(lx_gather_batch *b, const lx_gather_settings *settings
                           const lx_gather_output *out, lx_error *error)
 {
     lx_result result = LX_OK;
-    b->slow_count = b->onward_count = b->slow_row_count = 0;
+    b->slow_count = b->near_count = b->onward_count = b->slow_row_count = 0;
     if (out->luxels)
         for (size_t i = 0; i < count; ++i) out->luxels[i] = LX_NO_LUXEL;
     for (size_t i = 0; out->distances && i < count; ++i) out->distances[i] = INFINITY;

@@ -5,13 +5,6 @@
 #include "trace/light_tree.h"
 #include "trace/tracer.h"
 
-/// A place that receives light. Normals are unit and on the same side.
-typedef struct lx_receiver {
-    lx_vec3 position;         ///< On the surface.
-    lx_vec3 normal;           ///< Interpolated: of the cosine.
-    lx_vec3 geometric_normal; ///< Light from below it does not count.
-} lx_receiver;
-
 /// One sample of the irradiance that source `source` (of strength 1 and white colour) would give without occluders, and the shadow ray
 /// that decides. Range, spot cone, receiver's cosine, 1/pdf and, for sources that rays can hit (emissive surfaces, pictures of
 /// skies), the power-heuristic weight against cosine-weighted rays are in it; `count`: how many such samples share the work against one ray

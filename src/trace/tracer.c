@@ -608,15 +608,38 @@ static void prefetch_corners(const lx_tracer *tracer, const lx_hit *hit)
     }
 }
 
-void lx_shade_hits(const lx_tracer *tracer, const lx_ray *rays, const lx_hit *hits, lx_shading *shading, size_t count)
+enum { indices_ahead = 32, corners_ahead = 12 };
+
+static void prefetch_first(const lx_tracer *tracer, const lx_hit *hits, size_t count)
 {
-    enum { indices_ahead = 32, corners_ahead = 12 };
-    (void)rays;
     for (size_t i = 0; i < count && i < indices_ahead; ++i) prefetch_indices(tracer, &hits[i]);
     for (size_t i = 0; i < count && i < corners_ahead; ++i) prefetch_corners(tracer, &hits[i]);
+}
+
+static void prefetch_next(const lx_tracer *tracer, const lx_hit *hits, size_t i, size_t count)
+{
+    if (i + indices_ahead < count) prefetch_indices(tracer, &hits[i + indices_ahead]);
+    if (i + corners_ahead < count) prefetch_corners(tracer, &hits[i + corners_ahead]);
+}
+
+void lx_shade_hits(const lx_tracer *tracer, const lx_ray *rays, const lx_hit *hits, lx_shading *shading, size_t count)
+{
+    (void)rays;
+    prefetch_first(tracer, hits, count);
     for (size_t i = 0; i < count; ++i) {
-        if (i + indices_ahead < count) prefetch_indices(tracer, &hits[i + indices_ahead]);
-        if (i + corners_ahead < count) prefetch_corners(tracer, &hits[i + corners_ahead]);
+        prefetch_next(tracer, hits, i, count);
         if (hits[i].surface != LX_MISS) shade(tracer, &hits[i], &shading[i]);
+    }
+}
+
+void lx_hit_receivers(const lx_tracer *tracer, const lx_hit *hits, lx_receiver *receivers, size_t count)
+{
+    prefetch_first(tracer, hits, count);
+    for (size_t i = 0; i < count; ++i) {
+        const lx_hit *hit = &hits[i];
+        lx_receiver *r = &receivers[i];
+        prefetch_next(tracer, hits, i, count);
+        lx_hit_geometry(tracer, hit, &r->position, &r->geometric_normal);
+        r->normal = interpolated_normal(&tracer->surfaces[hit->surface], hit->triangle, hit->u, hit->v, r->geometric_normal);
     }
 }

@@ -40,6 +40,13 @@ typedef struct lx_shading {
                               ///< Unlit materials: their base colour.
 } lx_shading;
 
+/// A place that receives light. Normals are unit and on the same side.
+typedef struct lx_receiver {
+    lx_vec3 position;         ///< On the surface.
+    lx_vec3 normal;           ///< Interpolated: of the cosine.
+    lx_vec3 geometric_normal; ///< Light from below it does not count.
+} lx_receiver;
+
 typedef struct lx_tracer lx_tracer;
 
 /// Builds the acceleration structure and the tables for sampling sources. `include_dynamic`: non-static instances are in it
@@ -79,6 +86,8 @@ bool lx_trace_crowded(const lx_tracer *tracer, const lx_patch *patches, size_t c
 /// Shades hits; misses are skipped. Thread-safe.
 void lx_shade_hits(const lx_tracer *tracer, const lx_ray *rays, const lx_hit *hits, lx_shading *shading, size_t count);
 
+/// The front sides of many hits as places that receive light, without asking their materials.
+void lx_hit_receivers(const lx_tracer *tracer, const lx_hit *hits, lx_receiver *receivers, size_t count);
 /// The bare geometry of a hit: what is there without asking its material. `normal` is the unit geometric normal of the front side.
 void lx_hit_geometry(const lx_tracer *tracer, const lx_hit *hit, lx_vec3 *position, lx_vec3 *normal);
 /// Corners of a triangle in world space.

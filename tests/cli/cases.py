@@ -94,6 +94,8 @@ MISTAKES = {
     "integrator_unknown": ("bake room.glb -o out --integrator magic", ["magic", "gather|path"]),
     "denoiser_unknown": ("bake room.glb -o out --denoise magic", ["magic", "none|builtin|oidn"]),
     "noise_for_paths": ("bake room.glb -o out --integrator path --noise 0", ["--noise", "--integrator gather"]),
+    "interpolation_for_paths": ("bake room.glb -o out --integrator path --interpolation 0.1", ["--interpolation", "--integrator gather"]),
+    "interpolation_negative": ("bake room.glb -o out --interpolation -1", ["--interpolation", "below 0"]),
     "time_for_paths": ("bake room.glb -o out --integrator path --time 5m", ["--time", "--integrator gather"]),
     "memory_for_paths": ("bake room.glb -o out --integrator path --memory 2G", ["--memory", "--integrator gather"]),
     "denoise_for_paths": ("bake room.glb -o out --integrator path --denoise none", ["--denoise", "--integrator gather"]),
