@@ -1,0 +1,360 @@
+// Direct light, and the irradiance cache: radiosity of every luxel <- albedo × (direct light + mean over its rays of the radiosity there), for all layers at once.
+#include "bake/gather_job.h"
+
+#include "bake/interpolation.h"
+#include "base/clock.h"
+#include "base/error.h"
+#include "trace/tracer_data.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { most_passes = 1000 };
+
+static const float pass_near_texels = 1.0f;
+static const double enough_energy = 1e-3; // of a layer's: what later bounces may still have added
+// Variances of one look at the sky, as a share of it, from which on it is sampled besides, and four times as often.
+static const float some_sky_variance = 0.02f, much_sky_variance = 0.1f;
+static const uint32_t cache_stream = 0x63616368;
+
+// Mean albedo of a luxel: what its row is multiplied by. Hits that are looked up lie farther than a texel, where no finer detail can be told.
+static lx_rgb mean_albedo(const lx_gather_job *g, uint32_t luxel)
+{
+    enum { places = 8 };
+    uint32_t texel;
+    const lx_luxel_page *page = lx_job_page(g->job, luxel, &texel);
+    lx_texel t;
+    lx_texel_open(&t, g->bake, page, texel);
+    lx_ray rays[places];
+    lx_hit hits[places];
+    lx_shading shading[places];
+    for (uint32_t k = 0; k < places; ++k) {
+        lx_receiver r;
+        const lx_piece *piece = lx_texel_site(&t, k * (lx_site_count / places), &r);
+        const lx_fragment *f = &t.fragments[piece->fragment];
+        const lx_vec2 b = lx_piece_barycentrics(piece, r.position);
+        rays[k] = (lx_ray){.origin = r.position, .direction = lx_neg(r.geometric_normal), .t_max = 1};
+        hits[k] = (lx_hit){.surface = f->surface, .triangle = f->triangle, .u = b.x, .v = b.y};
+    }
+    lx_shade_hits(g->bake->tracer, rays, hits, shading, places);
+    lx_rgb sum = {0, 0, 0};
+    for (uint32_t k = 0; k < places; ++k) sum = lx_rgb_add(sum, shading[k].albedo);
+    return lx_rgb_scale(sum, 1.0f / places);
+}
+
+// ---- direct light and the cache's rays -----------------------------------------------------------------------------------------------
+
+// Adds a source's direct light to its layers: to the estimates if it counts there, to the cache's rows always.
+static void add_source(const lx_gather_job *g, lx_gather_scratch *s, uint32_t source, bool counts)
+{
+    const lx_source_use *use = &g->uses[source];
+    const uint32_t cells = lx_tracer_cell_count(g->bake->tracer, source);
+    for (uint32_t cell = 0; cell < cells; ++cell) {
+        const uint32_t layer = (uint32_t)use->layer + (use->cells ? 0 : cell);
+        const lx_rgb weight = use->cells ? lx_rgb_mul(use->weight, use->cells[cell]) : use->weight;
+        const float grey_weight = (weight.r + weight.g + weight.b) / 3;
+        const float unit = g->scales[layer];
+        lx_estimate *estimates = g->direct + (size_t)layer * g->luxel_count;
+        for (uint32_t i = 0; i < s->count; ++i) {
+            const lx_rgb e = lx_rgb_mul(s->mean[(size_t)cell * s->count + i], weight);
+            float *row = s->sums + g->stride * i + layer;
+            row[0] += e.r * unit;
+            row[g->row_layers] += e.g * unit;
+            row[2 * g->row_layers] += e.b * unit;
+            if (!counts) continue;
+            lx_estimate *estimate = &estimates[s->luxel[i]];
+            estimate->mean = lx_rgb_add(estimate->mean, e);
+            estimate->variance += s->variance[(size_t)cell * s->count + i] * grey_weight * grey_weight;
+        }
+    }
+}
+
+// Extras of a tile lie in the order in which paths ended; they are added after the luxel's plain hits, luxel by luxel.
+static int compare_extras(const void *a, const void *b)
+{
+    const lx_gather_extra *x = a, *y = b;
+    if (x->target != y->target) return x->target < y->target ? -1 : 1;
+    if (x->luxel != y->luxel) return x->luxel < y->luxel ? -1 : 1;
+    return memcmp(&x->weight, &y->weight, sizeof x->weight);
+}
+
+// What a luxel's cosine-weighted rays hit, as interpolation asks: the mean of 1 / distance².
+static float find_closeness(const float *distances, uint32_t count)
+{
+    float sum = 0;
+    for (uint32_t k = 0; k < count; ++k) sum += 1 / (distances[k] * distances[k]);
+    return sum / (float)count;
+}
+
+// The cache's rays of a tile: their hits are recorded; what they bring by themselves is added to the sums, in 1 / LX_ROW_UNIT for each ray, and what they meet at once to
+// the sums of that.
+static lx_result send_pass_rays(const lx_gather_job *g, lx_gather_scratch *s, size_t task, lx_error *error)
+{
+    const lx_gather_settings settings = {.tracer = g->bake->tracer, .lookup = &g->lookup, .uses = g->uses, .scales = g->scales,
+                                         .row_layers = g->row_layers, .bounces = g->settings.bounces, .everything = true, .near_texels = pass_near_texels};
+    lx_gather_extras *extras = &g->extras[task];
+    for (uint32_t first = 0; first < s->count; first += lx_gather_chunk_luxels) {
+        const uint32_t end = first + lx_gather_chunk_luxels < s->count ? first + lx_gather_chunk_luxels : s->count;
+        size_t count = 0;
+        for (uint32_t i = first; i < end; ++i)
+            for (uint32_t k = 0; k < g->pass_rays; ++k)
+                s->starts[count++] = (lx_gather_start){.receiver = &s->sites[i * lx_site_count + k % lx_site_count],
+                                                       .stream = s->stream[i] ^ cache_stream, .sample = k, .target = i};
+        const lx_gather_output out = {.sums = s->sums, .met = s->met, .sky_light = s->sky_light, .distances = s->distances, .luxels = s->found, .extras = extras};
+        const lx_result result = lx_gather_trace(s->batch, &settings, s->starts, count, &out, error);
+        if (result != LX_OK) return result;
+        for (uint32_t i = first; i < end; ++i) {
+            const size_t ray = (size_t)(i - first) * g->pass_rays;
+            if (settings.bounces > 0) memcpy(g->hits + (size_t)s->luxel[i] * g->pass_rays, s->found + ray, g->pass_rays * sizeof *g->hits);
+            g->closeness[s->luxel[i]] = find_closeness(s->distances + ray, g->pass_rays);
+        }
+    }
+    for (size_t k = 0; k < extras->count; ++k) extras->items[k].target = s->luxel[extras->items[k].target];
+    if (extras->count) qsort(extras->items, extras->count, sizeof *extras->items, compare_extras);
+    return LX_OK;
+}
+
+// Which luxels of the tile will send gather rays. Those that won't get all their direct light from samples.
+static void choose_senders(const lx_gather_job *g, lx_gather_scratch *s, const lx_luxel_tile *tile)
+{
+    const lx_luxel_map *map = &g->job->map.view;
+    if (!g->interpolates) return;
+    for (uint32_t i = tile->first; i < tile->first + tile->count; ++i) {
+        uint32_t texel;
+        const lx_luxel_page *page = lx_job_page(g->job, i, &texel);
+        if (!map->valid[i] || !lx_luxel_is_whole(g->bake, page, texel)) g->closeness[i] = INFINITY;
+    }
+    lx_choose_spacing(map, tile, g->closeness, g->bake->desc.interpolation, g->spacing);
+    for (uint32_t i = 0; i < s->count; ++i) s->alone[i] = g->spacing[s->luxel[i]] > 0;
+}
+
+// How often a luxel samples a uniform sky beside its gather rays, which look for it too: by the variance of one look, as the cache's rays in the luxel and around it tell; where
+// they saw all of it or nothing, not at all. (The rays that decide are others than those that count, so nothing is lost on average.)
+static void weigh_sky(const lx_gather_job *g, lx_gather_scratch *s)
+{
+    enum { edge = lx_luxel_tile_edge };
+    float seen[edge + 2][edge + 2], lists[edge + 2][edge + 2];
+    memset(seen, 0, sizeof seen);
+    memset(lists, 0, sizeof lists);
+    for (uint32_t i = 0; i < s->count; ++i) {
+        const uint32_t x = s->place[i] % edge + 1, y = s->place[i] / edge + 1;
+        seen[y][x] = lx_rgb_max(s->sky_light[i]) / (LX_PI * (float)g->pass_rays);
+        lists[y][x] = 1;
+    }
+    for (uint32_t i = 0; i < s->count; ++i) {
+        float sum = 0, count = 0;
+        for (uint32_t k = 0; k < 9; ++k) {
+            const uint32_t x = s->place[i] % edge + k % 3, y = s->place[i] / edge + k / 3;
+            sum += seen[y][x];
+            count += lists[y][x];
+        }
+        const float share = sum / count, variance = share * (1 - share);
+        uint8_t weight = variance > much_sky_variance ? 4 : variance > some_sky_variance;
+        if (s->alone[i] && weight == 0) weight = 1;
+        s->sky_weight[i] = g->sky_weight[s->luxel[i]] = weight;
+    }
+}
+
+// The cache's rays met a uniform sky as if nobody else looked for it: what samples share with them is taken from their part again.
+static void share_sky(const lx_gather_job *g, lx_gather_scratch *s, const lx_source_use *use)
+{
+    const float unit = g->scales[use->layer] / (float)g->pass_rays;
+    for (uint32_t i = 0; i < s->count; ++i) {
+        if (s->alone[i]) continue; // their part is gone already
+        const lx_rgb taken = lx_rgb_scale(lx_rgb_mul(s->sky_light[i], use->weight), (1 - lx_uniform_sky_weight(s->sky_weight[i])) * unit);
+        float *row = s->sums + g->stride * i + use->layer;
+        row[0] -= taken.r;
+        row[g->row_layers] -= taken.g;
+        row[2 * g->row_layers] -= taken.b;
+    }
+}
+
+static void light_from_sources(const lx_gather_job *g, lx_gather_scratch *s)
+{
+    const lx_bake_desc *desc = &g->bake->desc;
+    lx_direct_bounds bounds;
+    lx_direct_tile direct = {.count = s->count, .place = s->place, .chart = s->chart, .stream = s->stream, .sites = s->sites, .alone = s->alone,
+                             .sky_weight = s->sky_weight};
+    lx_direct_find_bounds(&direct, &bounds);
+    direct.bounds = &bounds;
+    const lx_direct_settings settings = {.tracer = g->bake->tracer, .samples = (desc->samples + lx_direct_sites - 1) / lx_direct_sites * lx_direct_sites,
+                                         .noise = desc->noise};
+    for (uint32_t source = 0; source < g->bake->source_count; ++source) {
+        const lx_source_use *use = &g->uses[source];
+        const bool counts = use->direct && !desc->indirect_only;
+        if (use->layer < 0 || (!counts && g->settings.bounces == 0)) continue;
+        if (lx_pool_is_stopping(g->bake->scene->context->pool)) return;
+        if (lx_direct_light(s->direct, &settings, &direct, source, s->mean, s->variance)) add_source(g, s, source, counts);
+        if (g->samples_sky && source == g->bake->source_count - 1 && g->settings.bounces > 0) share_sky(g, s, use); // the sky comes last
+    }
+}
+
+// Irradiance × unit becomes radiosity.
+static void reflect(const lx_gather_job *g, uint32_t luxel, const float *irradiance, float unit, float *radiosity, uint16_t *row)
+{
+    const lx_rgb a = g->albedo[luxel];
+    const float factor[3] = {a.r * unit, a.g * unit, a.b * unit};
+    for (size_t c = 0; c < 3; ++c)
+        for (size_t l = c * g->row_layers; l < (c + 1) * g->row_layers; ++l) {
+            const float value = factor[c] * irradiance[l];
+            if (radiosity) radiosity[l] = value;
+            row[l] = lx_row_encode(value);
+        }
+}
+
+static lx_result light_tile(void *user, size_t task, uint32_t worker, lx_error *error)
+{
+    const lx_gather_job *g = user;
+    const lx_luxel_tile *tile = &g->job->map.tiles[task];
+    lx_gather_scratch *s = &g->scratch[worker];
+    lx_gather_list_luxels(g, tile, false, s);
+    for (uint32_t i = 0; i < s->count; ++i) lx_gather_place_sites(g, s, i, 0, lx_site_count, s->sites + (size_t)i * lx_site_count);
+    const size_t row_values = g->stride * s->count;
+    memset(s->sums, 0, row_values * sizeof *s->sums);
+    memset(s->alone, 0, s->count);
+    memset(s->sky_light, 0, s->count * sizeof *s->sky_light);
+    const bool bounces = g->settings.bounces > 0;
+    if (bounces || g->interpolates || g->samples_sky) { // direct light must know as well
+        memset(s->met, 0, row_values * sizeof *s->met);
+        const lx_result result = send_pass_rays(g, s, task, error);
+        if (result != LX_OK) return result;
+        choose_senders(g, s, tile);
+        if (g->samples_sky) weigh_sky(g, s);
+    }
+    if (bounces) {
+        const float ray_unit = LX_ROW_UNIT / (float)g->pass_rays;
+        for (uint32_t i = 0; i < s->count; ++i) {
+            g->albedo[s->luxel[i]] = mean_albedo(g, s->luxel[i]);
+            reflect(g, s->luxel[i], s->sums + g->stride * i, ray_unit, NULL, g->rows[1] + g->stride * s->luxel[i]); // the first pass adds it
+        }
+        for (size_t i = 0; i < s->count; ++i)
+            for (size_t k = g->stride * i; k < g->stride * (i + 1); ++k)
+                s->sums[k] = s->alone[i] ? 0 : s->met[k] * ray_unit;
+    }
+    light_from_sources(g, s);
+    for (uint32_t i = 0; bounces && i < s->count; ++i) {
+        const size_t row = g->stride * s->luxel[i];
+        reflect(g, s->luxel[i], s->sums + g->stride * i, 1, g->radiosity + row, g->rows[0] + row);
+        memcpy(g->rows_direct + row, g->rows[0] + row, g->stride * sizeof *g->rows_direct);
+    }
+    return LX_OK;
+}
+
+lx_result lx_gather_light(lx_gather_job *g, lx_error *error)
+{
+    return lx_pool_run_weighted(g->bake->scene->context->pool, g->job->map.tile_count, g->job->tile_weights, light_tile, g, "direct", g->job->progress, error);
+}
+
+// ---- passes -------------------------------------------------------------------------------------------------------------------------
+
+static lx_result pass_tile(void *user, size_t task, uint32_t worker, lx_error *error)
+{
+    (void)error;
+    const lx_gather_job *g = user;
+    const lx_luxel_tile *tile = &g->job->map.tiles[task];
+    // What recorded paths found behind a near hit is a bounce further: where bounces are counted, of the pass before.
+    const uint16_t *from = g->rows[0], *from_later = lx_gather_is_truncated(g) ? g->rows[2] : g->rows[0];
+    float *sums = g->scratch[worker].sums;
+    double *change = g->pass_change + task * g->layer_count, *energy = g->pass_energy + task * g->layer_count;
+    memset(change, 0, g->layer_count * sizeof *change);
+    memset(energy, 0, g->layer_count * sizeof *energy);
+    const lx_gather_extras *extras = &g->extras[task];
+    size_t extra = 0;
+    const float unit = 1 / (float)g->pass_rays;
+    for (uint32_t i = tile->first; i < tile->first + tile->count; ++i) {
+        if (!g->job->map.valid[i]) continue;
+        memset(sums, 0, g->stride * sizeof *sums);
+        const uint32_t *hits = g->hits + (size_t)i * g->pass_rays;
+        for (uint32_t k = 0; k < g->pass_rays; ++k)
+            if (hits[k] != LX_NO_LUXEL) __builtin_prefetch(from + g->stride * hits[k]);
+        for (uint32_t k = 0; k < g->pass_rays; ++k)
+            if (hits[k] != LX_NO_LUXEL) lx_row_add(sums, from + g->stride * hits[k], g->stride);
+        for (; extra < extras->count && extras->items[extra].target == i; ++extra) {
+            const lx_gather_extra *e = &extras->items[extra];
+            const float weight[3] = {e->weight.r, e->weight.g, e->weight.b};
+            lx_row_add_scaled(sums, from_later + g->stride * e->luxel, g->row_layers, weight);
+        }
+        float *radiosity = g->radiosity + g->stride * i;
+        uint16_t *row = g->rows[1] + g->stride * i;
+        const lx_rgb a = g->albedo[i];
+        const float factor[3] = {a.r * LX_ROW_UNIT * unit, a.g * LX_ROW_UNIT * unit, a.b * LX_ROW_UNIT * unit};
+        for (size_t c = 0; c < 3; ++c)
+            for (size_t l = 0; l < g->layer_count; ++l) {
+                const size_t at = c * g->row_layers + l;
+                if (g->converged[l]) {
+                    row[at] = 0;
+                    continue;
+                }
+                float value = factor[c] * sums[at];
+                if (g->pass == 0) value += lx_row_decode_small(row[at]) * LX_ROW_UNIT; // light that those paths found themselves
+                row[at] = lx_row_encode(value);
+                radiosity[at] += value;
+                change[l] += (double)value;
+                energy[l] += (double)radiosity[at];
+            }
+    }
+    return LX_OK;
+}
+
+// What gather rays read: rows[0] the sum of all passes, for first hits; where bounces are counted rows[1], that without the last, for later ones, which are a bounce further.
+static lx_result sum_rows(void *user, size_t task, uint32_t worker, lx_error *error)
+{
+    (void)worker;
+    (void)error;
+    const lx_gather_job *g = user;
+    const lx_luxel_tile *tile = &g->job->map.tiles[task];
+    const bool truncated = lx_gather_is_truncated(g);
+    for (size_t i = g->stride * tile->first; i < g->stride * ((size_t)tile->first + tile->count); ++i) {
+        const float last = truncated ? lx_row_decode_small(g->rows[0][i]) * LX_ROW_UNIT : 0;
+        g->rows[0][i] = lx_row_encode(g->radiosity[i]);
+        if (truncated) g->rows[1][i] = lx_row_encode(g->radiosity[i] - last);
+    }
+    return LX_OK;
+}
+
+lx_result lx_gather_passes(lx_gather_job *g, lx_error *error)
+{
+    lx_result result = LX_OK;
+    const uint32_t wanted = lx_gather_is_truncated(g) ? g->settings.bounces - 1 : LX_BOUNCES_INF; // beyond the first; LX_BOUNCES_INF: until no layer gains what counts
+    lx_bake_job *job = g->job;
+    lx_pool *pool = g->bake->scene->context->pool;
+    double *changes = lx_calloc_array(g->layer_count, sizeof *changes); // of the last pass
+    if (!changes) return lx_fail_memory(error, "irradiance cache");
+    memset(g->converged, 0, g->layer_count);
+    lx_stage_part part = {.sink = job->progress, .start = lx_seconds()};
+    const lx_progress_sink sink = {lx_report_part, &part};
+    const uint32_t limit = wanted < most_passes ? wanted : most_passes;
+    for (uint32_t pass = 0; pass < limit; ++pass) {
+        const double expected = wanted == LX_BOUNCES_INF ? pass + 4.0 : limit; // nobody knows how many it will take
+        part.from = pass / expected;
+        part.share = 1 / (expected + (wanted == LX_BOUNCES_INF)) * (1 - part.from);
+        LX_TRY(lx_pool_run_weighted(pool, job->map.tile_count, job->tile_weights, pass_tile, g, "cache", &sink, error));
+        ++g->pass;
+        uint16_t *last = g->rows[0], *free_rows = lx_gather_is_truncated(g) ? g->rows[2] : last;
+        g->rows[0] = g->rows[1];
+        g->rows[1] = free_rows;
+        if (lx_gather_is_truncated(g)) g->rows[2] = last;
+        if (wanted != LX_BOUNCES_INF) continue;
+        bool all = true;
+        for (uint32_t l = 0; l < g->layer_count; ++l) {
+            double change = 0, energy = 0;
+            for (uint32_t t = 0; t < job->map.tile_count; ++t) {
+                change += g->pass_change[(size_t)t * g->layer_count + l];
+                energy += g->pass_energy[(size_t)t * g->layer_count + l];
+            }
+            if (g->converged[l]) continue;
+            // Each bounce is about `ratio` of the one before: what is still to come is the rest of a geometric series.
+            const double ratio = changes[l] > 0 ? fmin(change / changes[l], 0.99) : 0.9;
+            if (!(change * ratio / (1 - ratio) > enough_energy * energy)) g->converged[l] = 1;
+            changes[l] = change;
+            all &= g->converged[l] != 0;
+        }
+        if (all) break;
+    }
+    part.from = 1;
+    part.share = 0;
+    LX_TRY(lx_pool_run(pool, job->map.tile_count, sum_rows, g, "cache", &sink, error));
+cleanup:
+    lx_free(changes);
+    return result;
+}
