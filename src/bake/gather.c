@@ -60,11 +60,12 @@ static lx_result create_scratch(lx_gather_job *g, uint32_t workers, uint32_t rou
         s->starts = lx_malloc_array(lx_gather_chunk_luxels * rays, sizeof *s->starts);
         s->sums = lx_malloc_array(sum_rows, g->stride * sizeof *s->sums);
         s->met = lx_malloc_array(sum_rows, g->stride * sizeof *s->met);
+        s->near_light = lx_malloc_array(lx_gather_tile_luxels, g->stride * sizeof *s->near_light);
         s->mean = lx_malloc_array(cells * lx_gather_tile_luxels, sizeof *s->mean);
         s->variance = lx_malloc_array(cells * lx_gather_tile_luxels, sizeof *s->variance);
         s->found = lx_malloc_array((size_t)lx_gather_chunk_luxels * lx_gather_most_pass_rays, sizeof *s->found);
         s->distances = lx_malloc_array((size_t)lx_gather_chunk_luxels * lx_gather_most_pass_rays, sizeof *s->distances);
-        if (!s->batch || !s->direct || !s->sites || !s->starts || !s->sums || !s->met || !s->mean || !s->variance || !s->found ||
+        if (!s->batch || !s->direct || !s->sites || !s->starts || !s->sums || !s->met || !s->near_light || !s->mean || !s->variance || !s->found ||
             !s->distances)
             return lx_fail_memory(error, "workers");
     }
@@ -80,11 +81,11 @@ static void release_cache(lx_gather_job *g, uint32_t workers)
         if (s->direct) g->job->ray_count += lx_direct_batch_rays(s->direct);
         lx_gather_batch_destroy(s->batch);
         lx_direct_batch_destroy(s->direct);
-        void *arrays[] = {s->sites, s->starts, s->sums, s->met, s->mean, s->variance, s->found, s->distances};
+        void *arrays[] = {s->sites, s->starts, s->sums, s->met, s->near_light, s->mean, s->variance, s->found, s->distances};
         for (size_t k = 0; k < sizeof arrays / sizeof *arrays; ++k) lx_free(arrays[k]);
     }
     for (uint32_t t = 0; g->extras && t < g->job->map.tile_count; ++t) lx_free(g->extras[t].items);
-    void **arrays[] = {(void **)&g->scratch, (void **)&g->extras, (void **)&g->albedo, (void **)&g->rows[0], (void **)&g->rows[1],
+    void **arrays[] = {(void **)&g->scratch, (void **)&g->extras, (void **)&g->luxels, (void **)&g->rows[0], (void **)&g->rows[1],
                        (void **)&g->rows[2], (void **)&g->rows_direct, (void **)&g->hits, (void **)&g->met_estimates, (void **)&g->closeness, (void **)&g->spacing, (void **)&g->sky_weight};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) {
         lx_free(*arrays[i]);
@@ -132,7 +133,7 @@ static lx_result allocate(lx_gather_job *g, lx_error *error)
     if (!lx_mul_size(luxels, layers, &all) || !lx_mul_size(all, 64, &all)) return lx_fail_memory(error, "layers");
     g->scales = lx_calloc_array(g->row_layers, sizeof *g->scales);
     g->authored = lx_calloc_array(layers, sizeof *g->authored);
-    g->albedo = lx_calloc_array(cached, sizeof *g->albedo);
+    g->luxels = lx_calloc_array(cached, sizeof *g->luxels);
     g->closeness = lx_calloc_array(luxels, sizeof *g->closeness);
     g->spacing = lx_calloc_array(luxels, sizeof *g->spacing);
     g->sky_weight = lx_calloc_array(luxels, sizeof *g->sky_weight);
@@ -153,7 +154,7 @@ static lx_result allocate(lx_gather_job *g, lx_error *error)
     g->layer_means = lx_calloc_array(layers, sizeof *g->layer_means);
     g->halvings = lx_calloc_array(tiles, layers * sizeof *g->halvings);
     g->gain = lx_malloc_array(layers, sizeof *g->gain);
-    if (!g->scales || !g->authored || !g->albedo || !g->closeness || !g->spacing || !g->sky_weight || !g->rows[0] || !g->rows[1] || !g->rows[2] || !g->rows_direct || !g->hits || !g->extras || !g->direct || !g->indirect ||
+    if (!g->scales || !g->authored || !g->luxels || !g->closeness || !g->spacing || !g->sky_weight || !g->rows[0] || !g->rows[1] || !g->rows[2] || !g->rows_direct || !g->hits || !g->extras || !g->direct || !g->indirect ||
         !g->pass_change || !g->pass_energy || !g->converged || !g->tiles || !g->layer_means || !g->halvings || !g->gain)
         return lx_fail_memory(error, "layers; --memory bakes them in groups");
     for (size_t l = 0; l < layers; ++l) g->gain[l] = 1;
@@ -278,7 +279,7 @@ static lx_result bake_group(lx_bake_job *job, uint32_t first, uint32_t count, lx
         g.settings.rows = g.rows[0];
         g.settings.rows_later = !lx_gather_is_truncated(&g) ? g.rows[0] : bounces > 1 ? g.rows[1] : NULL;
         g.settings.rows_direct = g.rows_direct;
-        g.settings.albedo = g.albedo;
+        g.settings.luxels = g.luxels;
     }
     LX_TRY(lx_gather_rounds(&g, deadline, error));
     job->stages.gather += lx_lap(&stage_start);

@@ -12,6 +12,7 @@
 enum { most_passes = 1000 };
 
 static const float pass_near_texels = 1.0f;
+static const float near_source_texels = 4; // light of what is nearer differs too much over a luxel
 static const double enough_energy = 1e-3; // of a layer's: what later bounces may still have added
 // Variances of one look at the sky, as a share of it, from which on it is sampled besides, and four times as often.
 static const float some_sky_variance = 0.02f, much_sky_variance = 0.1f;
@@ -42,7 +43,22 @@ static lx_rgb mean_albedo(const lx_gather_job *g, uint32_t luxel)
     return lx_rgb_scale(sum, 1.0f / places);
 }
 
+// What near hits on the luxel will take of it.
+static lx_gather_luxel describe(const lx_gather_job *g, uint32_t luxel, const lx_receiver *first_site)
+{
+    uint32_t texel;
+    const lx_luxel_page *page = lx_job_page(g->job, luxel, &texel);
+    lx_gather_luxel out = {.albedo = mean_albedo(g, luxel), .centre = first_site->position, .reach = near_source_texels * lx_luxel_size(g->bake, page, texel)};
+    for (uint32_t s = 0; s < g->bake->source_count && !out.near_some; ++s) out.near_some = g->uses[s].layer >= 0 && lx_gather_is_near(g->bake->tracer, &out, s);
+    return out;
+}
+
 // ---- direct light and the cache's rays -----------------------------------------------------------------------------------------------
+
+static bool is_near(const lx_gather_job *g, uint32_t luxel, uint32_t source)
+{
+    return g->settings.bounces > 0 && g->luxels[luxel].near_some && lx_gather_is_near(g->bake->tracer, &g->luxels[luxel], source);
+}
 
 // Adds a source's direct light to its layers: to the estimates if it counts there, to the cache's rows always.
 static void add_source(const lx_gather_job *g, lx_gather_scratch *s, uint32_t source, bool counts)
@@ -57,7 +73,7 @@ static void add_source(const lx_gather_job *g, lx_gather_scratch *s, uint32_t so
         lx_estimate *estimates = g->direct + (size_t)layer * g->luxel_count;
         for (uint32_t i = 0; i < s->count; ++i) {
             const lx_rgb e = lx_rgb_mul(s->mean[(size_t)cell * s->count + i], weight);
-            float *row = s->sums + g->stride * i + layer;
+            float *row = (is_near(g, s->luxel[i], source) ? s->near_light : s->sums) + g->stride * i + layer;
             row[0] += e.r * unit;
             row[g->row_layers] += e.g * unit;
             row[2 * g->row_layers] += e.b * unit;
@@ -91,7 +107,7 @@ static float find_closeness(const float *distances, uint32_t count)
 static lx_result send_pass_rays(const lx_gather_job *g, lx_gather_scratch *s, size_t task, lx_error *error)
 {
     const lx_gather_settings settings = {.tracer = g->bake->tracer, .lookup = &g->lookup, .uses = g->uses, .scales = g->scales,
-                                         .row_layers = g->row_layers, .bounces = g->settings.bounces, .everything = true, .near_texels = pass_near_texels};
+                                         .row_layers = g->row_layers, .bounces = g->settings.bounces, .everything = true, .near_texels = pass_near_texels, .luxels = g->luxels};
     lx_gather_extras *extras = &g->extras[task];
     for (uint32_t first = 0; first < s->count; first += lx_gather_chunk_luxels) {
         const uint32_t end = first + lx_gather_chunk_luxels < s->count ? first + lx_gather_chunk_luxels : s->count;
@@ -100,7 +116,8 @@ static lx_result send_pass_rays(const lx_gather_job *g, lx_gather_scratch *s, si
             for (uint32_t k = 0; k < g->pass_rays; ++k)
                 s->starts[count++] = (lx_gather_start){.receiver = &s->sites[i * lx_site_count + k % lx_site_count],
                                                        .stream = s->stream[i] ^ cache_stream, .sample = k, .target = i};
-        const lx_gather_output out = {.sums = s->sums, .met = s->met, .sky_light = s->sky_light, .distances = s->distances, .luxels = s->found, .extras = extras};
+        const lx_gather_output out = {.sums = s->sums, .met = s->met, .near_met = settings.bounces > 0 ? s->near_light : NULL, .targets = s->luxel,
+                                      .sky_light = s->sky_light, .distances = s->distances, .luxels = s->found, .extras = extras};
         const lx_result result = lx_gather_trace(s->batch, &settings, s->starts, count, &out, error);
         if (result != LX_OK) return result;
         for (uint32_t i = first; i < end; ++i) {
@@ -192,7 +209,7 @@ static void light_from_sources(const lx_gather_job *g, lx_gather_scratch *s)
 // Irradiance × unit becomes radiosity.
 static void reflect(const lx_gather_job *g, uint32_t luxel, const float *irradiance, float unit, float *radiosity, uint16_t *row)
 {
-    const lx_rgb a = g->albedo[luxel];
+    const lx_rgb a = g->luxels[luxel].albedo;
     const float factor[3] = {a.r * unit, a.g * unit, a.b * unit};
     for (size_t c = 0; c < 3; ++c)
         for (size_t l = c * g->row_layers; l < (c + 1) * g->row_layers; ++l) {
@@ -213,9 +230,11 @@ static lx_result light_tile(void *user, size_t task, uint32_t worker, lx_error *
     memset(s->sums, 0, row_values * sizeof *s->sums);
     memset(s->alone, 0, s->count);
     memset(s->sky_light, 0, s->count * sizeof *s->sky_light);
+    for (uint32_t i = 0; g->settings.bounces > 0 && i < s->count; ++i) g->luxels[s->luxel[i]] = describe(g, s->luxel[i], &s->sites[(size_t)i * lx_site_count]);
     const bool bounces = g->settings.bounces > 0;
     if (bounces || g->interpolates || g->samples_sky) { // direct light must know as well
         memset(s->met, 0, row_values * sizeof *s->met);
+        memset(s->near_light, 0, row_values * sizeof *s->near_light);
         const lx_result result = send_pass_rays(g, s, task, error);
         if (result != LX_OK) return result;
         choose_senders(g, s, tile);
@@ -224,18 +243,22 @@ static lx_result light_tile(void *user, size_t task, uint32_t worker, lx_error *
     if (bounces) {
         const float ray_unit = LX_ROW_UNIT / (float)g->pass_rays;
         for (uint32_t i = 0; i < s->count; ++i) {
-            g->albedo[s->luxel[i]] = mean_albedo(g, s->luxel[i]);
             reflect(g, s->luxel[i], s->sums + g->stride * i, ray_unit, NULL, g->rows[1] + g->stride * s->luxel[i]); // the first pass adds it
         }
         for (size_t i = 0; i < s->count; ++i)
-            for (size_t k = g->stride * i; k < g->stride * (i + 1); ++k)
+            for (size_t k = g->stride * i; k < g->stride * (i + 1); ++k) {
                 s->sums[k] = s->alone[i] ? 0 : s->met[k] * ray_unit;
+                s->near_light[k] = s->alone[i] ? 0 : s->near_light[k] * ray_unit;
+            }
     }
     light_from_sources(g, s);
     for (uint32_t i = 0; bounces && i < s->count; ++i) {
         const size_t row = g->stride * s->luxel[i];
-        reflect(g, s->luxel[i], s->sums + g->stride * i, 1, g->radiosity + row, g->rows[0] + row);
-        memcpy(g->rows_direct + row, g->rows[0] + row, g->stride * sizeof *g->rows_direct);
+        float *sums = s->sums + g->stride * i;
+        const float *near_light = s->near_light + g->stride * i;
+        reflect(g, s->luxel[i], sums, 1, NULL, g->rows_direct + row);
+        for (size_t k = 0; k < g->stride; ++k) sums[k] += near_light[k];
+        reflect(g, s->luxel[i], sums, 1, g->radiosity + row, g->rows[0] + row);
     }
     return LX_OK;
 }
@@ -276,7 +299,7 @@ static lx_result pass_tile(void *user, size_t task, uint32_t worker, lx_error *e
         }
         float *radiosity = g->radiosity + g->stride * i;
         uint16_t *row = g->rows[1] + g->stride * i;
-        const lx_rgb a = g->albedo[i];
+        const lx_rgb a = g->luxels[i].albedo;
         const float factor[3] = {a.r * LX_ROW_UNIT * unit, a.g * LX_ROW_UNIT * unit, a.b * LX_ROW_UNIT * unit};
         for (size_t c = 0; c < 3; ++c)
             for (size_t l = 0; l < g->layer_count; ++l) {

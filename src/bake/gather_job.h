@@ -23,6 +23,7 @@ typedef struct lx_gather_scratch {
     lx_gather_start *starts; // [lx_gather_chunk_luxels × rays of a round at most]
     float *sums;            // [2][lx_gather_chunk_luxels][3][row_layers], or [lx_gather_tile_luxels][3][row_layers]
     float *met;             // the same, of what rays meet of light sources
+    float *near_light;      // [lx_gather_tile_luxels][3][row_layers] of sources near the luxel
     lx_rgb *mean;           // [cells][lx_gather_tile_luxels] of one source
     float *variance;
     uint32_t *found;        // [lx_gather_chunk_luxels][lx_gather_most_pass_rays]
@@ -64,7 +65,7 @@ typedef struct lx_gather_job {
     lx_lookup lookup;
     float *scales;          // [row_layers]
     float *authored;        // [layer_count] mean channel of c
-    lx_rgb *albedo;         // [luxel]
+    lx_gather_luxel *luxels; // [luxel]
     float *closeness;       // [luxel] of what is around, 1 / m²; INFINITY: not to be interpolated
     uint8_t *sky_weight;    // [luxel] of samples of a uniform sky against gather rays; 0: those alone look for it
     uint8_t *spacing;       // [luxel] of the knots it is interpolated from; 0: it sends gather rays
@@ -73,7 +74,7 @@ typedef struct lx_gather_job {
     float *radiosity;       // [luxel][3][row_layers] of all passes so far, times scale; until gathering begins it lives where `indirect` will
     uint16_t *rows[3];      // [luxel][3][row_layers] what the last pass added, what the next one will, and with a number of bounces what the pass before the last added;
                             // in the end what gather rays read
-    uint16_t *rows_direct;  // [luxel][3][row_layers] light straight from the sources
+    uint16_t *rows_direct;  // [luxel][3][row_layers] light straight from sources that are not near
     uint32_t pass;          // passes so far
     uint32_t pass_rays;
     uint32_t *hits;         // [luxel][pass_rays]

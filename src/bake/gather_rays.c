@@ -28,7 +28,7 @@ typedef struct flight {
     uint32_t stream, sample, target;
     uint32_t vertex, passes;
     uint32_t last_surface, last_triangle;
-    bool is_lit; // all light straight from sources is known where the ray came from: what it meets of them is counted already
+    uint32_t from; // luxel whose direct light was taken where the ray came from: what it meets of sources is counted already, but for near ones. LX_NO_LUXEL: none was
 } flight;
 
 typedef struct vertex_record {
@@ -72,7 +72,7 @@ struct lx_gather_batch {
     size_t onward_count;
     slow_row slow_rows[2 * batch_size];
     size_t slow_row_count;
-    vertex_record vertices[2 * batch_size];
+    vertex_record vertices[2 * batch_size]; // that take light samples
     lx_ray shadow_rays[batch_size];
     lx_rgb light[batch_size], transmittance[batch_size];
     uint32_t owner[batch_size], cell[batch_size];
@@ -101,14 +101,18 @@ static uint32_t dimension_key(uint32_t stream, uint32_t vertex, uint32_t dimensi
 
 // ---- what arrives ---------------------------------------------------------------------------------------------------------------
 
-// `vertex`: where the ray that found the light came from.
-static void add_light(const lx_gather_settings *settings, const lx_gather_output *out, uint32_t vertex, uint32_t target, const lx_source_use *use,
-                      uint32_t cell, lx_rgb value)
+// The sums that take light met by a ray from vertex `vertex`.
+static float *sums_for(const lx_gather_output *out, uint32_t vertex)
+{
+    return vertex == 0 && out->met ? out->met : out->sums;
+}
+
+static void add_light(const lx_gather_settings *settings, float *sums, uint32_t target, const lx_source_use *use, uint32_t cell, lx_rgb value)
 {
     const size_t layer = (size_t)use->layer + (use->cells ? 0 : cell), layers = settings->row_layers;
     if (use->cells) value = lx_rgb_mul(value, use->cells[cell]);
     const float unit = settings->scales[layer] * (1 / LX_ROW_UNIT);
-    float *sum = (vertex == 0 && out->met ? out->met : out->sums) + 3 * layers * target + layer;
+    float *sum = sums + 3 * layers * target + layer;
     sum[0] += value.r * use->weight.r * unit;
     sum[layers] += value.g * use->weight.g * unit;
     sum[2 * layers] += value.b * use->weight.b * unit;
@@ -119,6 +123,22 @@ static bool counts(const lx_gather_settings *settings, const lx_source_use *use,
 {
     if (use->layer < 0) return false;
     return vertex > 0 || settings->everything || (settings->direct && use->direct);
+}
+
+bool lx_gather_is_near(const lx_tracer *tracer, const lx_gather_luxel *luxel, uint32_t source)
+{
+    const lx_source_sphere *s = &tracer->source_spheres[source];
+    const lx_vec3 d = lx_sub(s->centre, luxel->centre);
+    const float reach = luxel->reach + s->radius;
+    return s->power < INFINITY && lx_dot(d, d) < reach * reach;
+}
+
+// Does the flight bring light straight from the source to where it came from?
+static bool brings(const lx_gather_settings *settings, const flight *f, uint32_t source)
+{
+    if (f->from == LX_NO_LUXEL) return true;
+    const lx_gather_luxel *luxel = &settings->luxels[f->from];
+    return luxel->near_some && lx_gather_is_near(settings->tracer, luxel, source);
 }
 
 static void add_sky(const lx_gather_settings *settings, const lx_gather_output *out, lx_rgb throughput, float cosine, uint32_t target,
@@ -132,7 +152,7 @@ static void add_sky(const lx_gather_settings *settings, const lx_gather_output *
     const float weight = vertex == 0 ? lx_direct_sky_weight(tracer, direction, cosine, samples) : lx_sky_weight(tracer, direction, cosine);
     const lx_rgb light = lx_rgb_scale(lx_rgb_mul(throughput, lx_sky_radiance(&tracer->sky, direction)), LX_PI);
     if (vertex == 0 && out->sky_light) out->sky_light[target] = lx_rgb_add(out->sky_light[target], light);
-    add_light(settings, out, vertex, target, use, 0, lx_rgb_scale(light, weight));
+    add_light(settings, sums_for(out, vertex), target, use, 0, lx_rgb_scale(light, weight));
 }
 
 static void add_emission(const lx_gather_settings *settings, const lx_gather_output *out, const flight *f, const lx_ray *ray, const lx_hit *hit,
@@ -141,12 +161,14 @@ static void add_emission(const lx_gather_settings *settings, const lx_gather_out
     const int32_t source = settings->tracer->scene->surfaces[hit->surface].source;
     if (source < 0 || lx_rgb_is_black(s->emission)) return;
     const lx_source_use *use = &settings->uses[source];
-    if (!counts(settings, use, f->vertex)) return;
+    if (!counts(settings, use, f->vertex) || !brings(settings, f, (uint32_t)source)) return;
     const lx_tracer *tracer = settings->tracer;
     const uint32_t samples = f->vertex == 0 ? lx_direct_sample_weight(tracer, (uint32_t)source) : 1;
     const float weight = lx_hit_weight(tracer, ray, hit, s->geometric_normal, f->cosine, samples);
     const uint32_t cell = lx_tracer_cell_at(tracer, hit->surface, hit->triangle, hit->u, hit->v);
-    add_light(settings, out, f->vertex, f->target, use, cell, lx_rgb_scale(lx_rgb_mul(f->throughput, s->emission), LX_PI * weight));
+    const bool near = f->vertex == 0 && out->near_met && lx_gather_is_near(tracer, &settings->luxels[out->targets[f->target]], (uint32_t)source);
+    add_light(settings, near ? out->near_met : sums_for(out, f->vertex), f->target, use, cell,
+              lx_rgb_scale(lx_rgb_mul(f->throughput, s->emission), LX_PI * weight));
 }
 
 // ---- directions -------------------------------------------------------------------------------------------------------------------
@@ -177,6 +199,63 @@ static inline lx_vec3 cosine_direction(lx_vec2 u)
 static uint32_t tap_bits(uint32_t stream, uint32_t vertex, uint32_t sample)
 {
     return lx_hash32((vertex == 0 ? stream : dimension_key(stream, vertex, 0)) ^ (sample * 0x9e3779b9u));
+}
+
+// ---- light samples -----------------------------------------------------------------------------------------------------------------
+
+// The light of a vertex is but one of a luxel's many rays: roulette skips more of it than the path integrator does.
+static bool sample_light(const lx_gather_settings *settings, uint32_t source, const vertex_record *v, lx_ray *ray, lx_rgb *light, uint32_t *cell)
+{
+    // source_scales are a twentieth of the mean. Few samples come near their bound.
+    enum { scale_factor = 400, bound_excess = 2 };
+    const lx_tracer *tracer = settings->tracer;
+    const flight *f = &v->flight;
+    const uint32_t key = lx_hash_combine(tracer->source_keys[source], gather_key + f->vertex + 1);
+    const float scale = scale_factor * tracer->source_scales[source];
+    float bound = lx_source_bound(tracer, source, &v->receiver);
+    if (bound == 0) return false;
+    // Within the sphere around a long tube or a string of bulbs: nothing is certain, but few places are much brighter than this.
+    const lx_source_sphere *sphere = &tracer->source_spheres[source];
+    if (!(bound < INFINITY) && sphere->power < INFINITY && sphere->radius > 0) bound = 4 * sphere->power / (sphere->radius * sphere->radius);
+    const float brightness = lx_rgb_max(f->throughput);
+    const float chance = lx_light_roulette(f->stream, f->sample, key ^ 0x68bc21ebu, brightness * bound / bound_excess, scale);
+    if (chance == 0) return false;
+    const lx_vec2 u = lx_sobol_pair(f->sample, lx_hash_combine(f->stream, key));
+    if (!lx_sample_source(tracer, source, &v->receiver, u, 1, ray, light, cell)) return false;
+    *light = lx_rgb_scale(*light, chance);
+    const float again = lx_light_roulette(f->stream, f->sample, key ^ 0x02e5be93u, brightness * lx_rgb_max(*light), scale);
+    *light = lx_rgb_scale(*light, again);
+    return again > 0;
+}
+
+static void flush_shadow_rays(lx_gather_batch *b, const lx_gather_settings *settings, const lx_source_use *use, size_t count,
+                              const lx_gather_output *out)
+{
+    lx_trace_transmittance(settings->tracer, b->shadow_rays, b->transmittance, count);
+    b->ray_count += count;
+    for (size_t k = 0; k < count; ++k) {
+        const flight *f = &b->vertices[b->owner[k]].flight;
+        const lx_rgb arrives = lx_rgb_mul(b->light[k], b->transmittance[k]);
+        if (!lx_rgb_is_black(arrives)) add_light(settings, out->sums, f->target, use, b->cell[k], lx_rgb_mul(f->throughput, arrives));
+    }
+}
+
+static void next_events(lx_gather_batch *b, const lx_gather_settings *settings, size_t vertex_count, const lx_gather_output *out)
+{
+    for (uint32_t s = 0; s < settings->tracer->source_count; ++s) {
+        const lx_source_use *use = &settings->uses[s];
+        if (use->layer < 0) continue;
+        size_t count = 0;
+        for (size_t i = 0; i < vertex_count; ++i) {
+            if (!brings(settings, &b->vertices[i].flight, s)) continue;
+            if (!sample_light(settings, s, &b->vertices[i], &b->shadow_rays[count], &b->light[count], &b->cell[count])) continue;
+            b->owner[count++] = (uint32_t)i;
+            if (count < batch_size) continue;
+            flush_shadow_rays(b, settings, use, count, out);
+            count = 0;
+        }
+        flush_shadow_rays(b, settings, use, count, out);
+    }
 }
 
 // ---- hits that are too near -------------------------------------------------------------------------------------------------------
@@ -232,16 +311,21 @@ static void add_slow_rows(lx_gather_batch *b, const lx_gather_settings *settings
 static void leave_near(lx_gather_batch *b, const lx_gather_settings *settings, flight f, const lx_hit *hit, uint32_t luxel)
 {
     note_row(b, settings->rows_direct, settings, &f, luxel);
-    if (!survives(&f, settings->albedo[luxel])) return;
-    f.is_lit = true;
+    if (!survives(&f, settings->luxels[luxel].albedo)) return;
+    f.from = luxel;
     b->near_hits[b->near_count] = *hit;
     b->near[b->near_count++] = f;
 }
 
-static void leave_all_near(lx_gather_batch *b, const lx_gather_settings *settings)
+static void leave_all_near(lx_gather_batch *b, const lx_gather_settings *settings, const lx_gather_output *out)
 {
+    size_t vertex_count = 0;
     lx_hit_receivers(settings->tracer, b->near_hits, b->near_receivers, b->near_count);
-    for (size_t i = 0; i < b->near_count; ++i) go_on(b, &b->near_receivers[i], b->near[i]);
+    for (size_t i = 0; i < b->near_count; ++i) {
+        if (settings->luxels[b->near[i].from].near_some) b->vertices[vertex_count++] = (vertex_record){b->near_receivers[i], b->near[i]};
+        go_on(b, &b->near_receivers[i], b->near[i]);
+    }
+    next_events(b, settings, vertex_count, out);
     b->near_count = 0;
 }
 
@@ -357,7 +441,7 @@ static void first_hits(lx_gather_batch *b, const lx_gather_settings *settings, c
             continue;
         }
         const flight f = {.throughput = {1, 1, 1}, .cosine = b->cosines[i], .stream = start->stream, .sample = start->sample,
-                          .target = start->target, .last_surface = LX_MISS};
+                          .target = start->target, .last_surface = LX_MISS, .from = LX_NO_LUXEL};
         send(b, &b->rays[i], hit, &f);
     }
     size_t found_count = 0;
@@ -367,7 +451,7 @@ static void first_hits(lx_gather_batch *b, const lx_gather_settings *settings, c
         const uint32_t luxel = lx_lookup_luxel(settings->lookup, b->pending[k].taps);
         if (luxel == LX_NO_LUXEL || b->pending[k].near) {
             const flight f = {.throughput = {1, 1, 1}, .cosine = b->cosines[i], .stream = start->stream, .sample = start->sample,
-                              .target = start->target, .last_surface = LX_MISS};
+                              .target = start->target, .last_surface = LX_MISS, .from = LX_NO_LUXEL};
             if (luxel == LX_NO_LUXEL)
                 send(b, &b->rays[i], &b->hits[i], &f);
             else
@@ -382,7 +466,7 @@ static void first_hits(lx_gather_batch *b, const lx_gather_settings *settings, c
     }
     if (settings->rows && !out->luxels) add_rows(b, settings, out, found_count);
     add_slow_rows(b, settings, out);
-    leave_all_near(b, settings);
+    leave_all_near(b, settings, out);
 }
 
 // ---- the second loop -----------------------------------------------------------------------------------------------------------------
@@ -439,60 +523,6 @@ static lx_result find_slow_row(lx_gather_batch *b, const lx_gather_settings *set
     return LX_OK;
 }
 
-// The light of a vertex is but one of a luxel's many rays: roulette skips more of it than the path integrator does.
-static bool sample_light(const lx_gather_settings *settings, uint32_t source, const vertex_record *v, lx_ray *ray, lx_rgb *light, uint32_t *cell)
-{
-    // source_scales are a twentieth of the mean. Few samples come near their bound.
-    enum { scale_factor = 400, bound_excess = 2 };
-    const lx_tracer *tracer = settings->tracer;
-    const flight *f = &v->flight;
-    const uint32_t key = lx_hash_combine(tracer->source_keys[source], gather_key + f->vertex + 1);
-    const float scale = scale_factor * tracer->source_scales[source];
-    float bound = lx_source_bound(tracer, source, &v->receiver);
-    if (bound == 0) return false;
-    // Within the sphere around a long tube or a string of bulbs: nothing is certain, but few places are much brighter than this.
-    const lx_source_sphere *sphere = &tracer->source_spheres[source];
-    if (!(bound < INFINITY) && sphere->power < INFINITY && sphere->radius > 0) bound = 4 * sphere->power / (sphere->radius * sphere->radius);
-    const float brightness = lx_rgb_max(f->throughput);
-    const float chance = lx_light_roulette(f->stream, f->sample, key ^ 0x68bc21ebu, brightness * bound / bound_excess, scale);
-    if (chance == 0) return false;
-    const lx_vec2 u = lx_sobol_pair(f->sample, lx_hash_combine(f->stream, key));
-    if (!lx_sample_source(tracer, source, &v->receiver, u, 1, ray, light, cell)) return false;
-    *light = lx_rgb_scale(*light, chance);
-    const float again = lx_light_roulette(f->stream, f->sample, key ^ 0x02e5be93u, brightness * lx_rgb_max(*light), scale);
-    *light = lx_rgb_scale(*light, again);
-    return again > 0;
-}
-
-static void flush_shadow_rays(lx_gather_batch *b, const lx_gather_settings *settings, const lx_source_use *use, size_t count,
-                              const lx_gather_output *out)
-{
-    lx_trace_transmittance(settings->tracer, b->shadow_rays, b->transmittance, count);
-    b->ray_count += count;
-    for (size_t k = 0; k < count; ++k) {
-        const flight *f = &b->vertices[b->owner[k]].flight;
-        const lx_rgb arrives = lx_rgb_mul(b->light[k], b->transmittance[k]);
-        if (!lx_rgb_is_black(arrives)) add_light(settings, out, f->vertex + 1, f->target, use, b->cell[k], lx_rgb_mul(f->throughput, arrives));
-    }
-}
-
-static void next_events(lx_gather_batch *b, const lx_gather_settings *settings, size_t vertex_count, const lx_gather_output *out)
-{
-    for (uint32_t s = 0; s < settings->tracer->source_count; ++s) {
-        const lx_source_use *use = &settings->uses[s];
-        if (use->layer < 0) continue;
-        size_t count = 0;
-        for (size_t i = 0; i < vertex_count; ++i) {
-            if (!sample_light(settings, s, &b->vertices[i], &b->shadow_rays[count], &b->light[count], &b->cell[count])) continue;
-            b->owner[count++] = (uint32_t)i;
-            if (count < batch_size) continue;
-            flush_shadow_rays(b, settings, use, count, out);
-            count = 0;
-        }
-        flush_shadow_rays(b, settings, use, count, out);
-    }
-}
-
 // What needs no shading: rays that left the scene, hits that are black or looked up. Others stay, in order; *count is how many.
 static lx_result finish_simple(lx_gather_batch *b, const lx_gather_settings *settings, size_t *count, const lx_gather_output *out, lx_error *error)
 {
@@ -502,7 +532,7 @@ static lx_result finish_simple(lx_gather_batch *b, const lx_gather_settings *set
         const flight *f = &b->flights[i];
         const lx_hit *hit = &b->slow_hits[i];
         if (hit->surface == LX_MISS) {
-            if (!f->is_lit) add_sky(settings, out, f->throughput, f->cosine, f->target, b->slow_rays[i].direction, f->vertex);
+            if (settings->tracer->sky.present && brings(settings, f, settings->tracer->source_count - 1)) add_sky(settings, out, f->throughput, f->cosine, f->target, b->slow_rays[i].direction, f->vertex);
             continue;
         }
         const lx_lookup_surface *surface = &settings->lookup->surfaces[hit->surface];
@@ -541,7 +571,7 @@ static lx_result step(lx_gather_batch *b, const lx_gather_settings *settings, co
         const lx_lookup_surface *surface = &settings->lookup->surfaces[hit->surface];
         if (!surface->plain) {
             const bool again = hit->surface == f.last_surface && hit->triangle == f.last_triangle;
-            if (!again && !f.is_lit) add_emission(settings, out, &f, &ray, hit, s);
+            if (!again) add_emission(settings, out, &f, &ray, hit, s);
             if (again || passes_on(&f, s)) {
                 if (++f.passes > most_passes) continue;
                 f.last_surface = hit->surface;
@@ -559,13 +589,13 @@ static lx_result step(lx_gather_batch *b, const lx_gather_settings *settings, co
                 continue;
             }
         }
-        f.is_lit = false;
+        f.from = LX_NO_LUXEL;
         if (make_vertex(&f, s, &b->vertices[vertex_count])) ++vertex_count;
     }
     add_slow_rows(b, settings, out);
     next_events(b, settings, vertex_count, out);
-    leave_all_near(b, settings);
     for (size_t i = 0; i < vertex_count; ++i) go_on(b, &b->vertices[i].receiver, b->vertices[i].flight);
+    leave_all_near(b, settings, out);
     memcpy(b->slow_rays + kept, b->onward_rays, b->onward_count * sizeof *b->slow_rays);
     memcpy(b->flights + kept, b->onward, b->onward_count * sizeof *b->flights);
     kept += b->onward_count;

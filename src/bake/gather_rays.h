@@ -11,6 +11,16 @@
 #include "bake/lookup.h"
 #include "bake/rows.h"
 
+/// What near hits take of a luxel beside its row of direct light.
+typedef struct lx_gather_luxel {
+    lx_rgb albedo;
+    lx_vec3 centre;
+    float reach;      ///< How far from the centre a source is near: light of such ones is in no row of direct light, for it differs too much over the luxel.
+    bool near_some;   ///< There are some.
+} lx_gather_luxel;
+
+bool lx_gather_is_near(const lx_tracer *tracer, const lx_gather_luxel *luxel, uint32_t source);
+
 typedef struct lx_gather_settings {
     const lx_tracer *tracer;
     const lx_lookup *lookup;
@@ -22,8 +32,8 @@ typedef struct lx_gather_settings {
     bool everything;            ///< The cache's own rays: all light counts.
     const uint16_t *rows;       ///< [luxel][3][row_layers] what a first hit reads: all bounces but one. NULL: nothing (or recorded, see below).
     const uint16_t *rows_later; ///< What later hits read: all bounces but two.
-    const uint16_t *rows_direct; ///< Light straight from the sources alone: for hits too near for all light to be looked up. NULL: they get light samples.
-    const lx_rgb *albedo;       ///< [luxel], beside rows_direct.
+    const uint16_t *rows_direct; ///< Light straight from sources that are not near, for hits too near for all light to be looked up. NULL: they get light samples.
+    const lx_gather_luxel *luxels;
     const uint8_t *sky_weight;  ///< [target] samples that share the light of a uniform sky with a first ray (lx_direct_tile). NULL: none do.
     float near_texels;          ///< Hits nearer than so many texels of their surface are not looked up.
 } lx_gather_settings;
@@ -50,6 +60,8 @@ typedef struct lx_gather_output {
     float *sums;             ///< [target][3][row_layers], added to.
     float *met;              ///< Likewise, what the first rays themselves meet of light sources. NULL: that goes to `sums` too.
     lx_rgb *sky_light;       ///< [target] added to: what first rays meet of the sky, without weight. NULL: not wanted.
+    float *near_met;         ///< Likewise, of emissive sources that are near luxel `targets`[target]. NULL: that goes to `met`.
+    const uint32_t *targets;
     float *distances;        ///< [start] to the first hit; INFINITY: none. NULL: not wanted.
     uint32_t *luxels;        ///< Recording (no rows are read): [start] luxel that the first hit may be looked up at, else LX_NO_LUXEL. NULL: rows are added.
     lx_gather_extras *extras; ///< Recording: later hits.

@@ -9,7 +9,7 @@
 // What gathering keeps, in bytes.
 static const struct {
     // Per luxel:
-    uint32_t albedo;
+    uint32_t luxel;           // what near hits take of it
     uint32_t pass_ray;        // and ray of the passes: the luxel it hit,
     uint32_t extra;           // and what paths that went on found, on average
     uint32_t sum;             // estimate of the sum of all layers, how close what is around is, by what knots the luxel is interpolated, and whether the sky is sampled
@@ -24,10 +24,10 @@ static const struct {
     uint32_t tile;
     // Per worker:
     uint32_t batches;
-    uint32_t worker_row; // and layer, padded: sums of a tile, and what is met of them
+    uint32_t worker_row; // and layer, padded: sums of a tile, what is met of them, and what comes from near
     uint32_t worker_cell; // and cell of the largest monitor: light of a tile
 } cost = {
-    .albedo = sizeof(lx_rgb),
+    .luxel = sizeof(lx_gather_luxel),
     .pass_ray = sizeof(uint32_t),
     .extra = 40,
     .sum = 6 * sizeof(float) + 2 * sizeof(uint8_t),
@@ -39,7 +39,7 @@ static const struct {
     .place = 2 * sizeof(uint32_t),
     .tile = 4 * sizeof(double) + 1,
     .batches = 4 << 20,
-    .worker_row = 2 * lx_luxel_tile_edge * lx_luxel_tile_edge * 3 * sizeof(float),
+    .worker_row = 3 * lx_luxel_tile_edge * lx_luxel_tile_edge * 3 * sizeof(float),
     .worker_cell = lx_luxel_tile_edge * lx_luxel_tile_edge * (sizeof(lx_rgb) + sizeof(float)),
 };
 
@@ -90,7 +90,7 @@ static uint64_t group_bytes(const lx_bake_job *job, const lx_finish *finish, uin
     const uint64_t met = met_layer_count(bake) < layers ? met_layer_count(bake) : layers;
     uint64_t cache = lookup_bytes(bake) + workers * (cost.batches + cost.worker_row * padded + (uint64_t)cost.worker_cell * largest_cell_count(bake));
     cache += luxels * cost.met * met;
-    if (bounces) cache += luxels * (cost.albedo + cost.pass_ray * most_pass_rays + cost.extra + (cost.row + (truncated ? cost.pass_row : 0)) * padded);
+    if (bounces) cache += luxels * (cost.luxel + cost.pass_ray * most_pass_rays + cost.extra + (cost.row + (truncated ? cost.pass_row : 0)) * padded);
     const uint64_t finishing = lx_finish_worker_bytes(finish) * (layers < workers ? layers : workers); // the cache is gone by then
     return estimates + (cache > finishing ? cache : finishing);
 }
