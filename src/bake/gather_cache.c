@@ -19,20 +19,16 @@ static const float some_sky_variance = 0.02f, much_sky_variance = 0.1f;
 static const uint32_t cache_stream = 0x63616368;
 
 // Mean albedo of a luxel: what its row is multiplied by. Hits that are looked up lie farther than a texel, where no finer detail can be told.
-static lx_rgb mean_albedo(const lx_gather_job *g, uint32_t luxel)
+static lx_rgb mean_albedo(const lx_gather_job *g, lx_texel *t)
 {
     enum { places = 8 };
-    uint32_t texel;
-    const lx_luxel_page *page = lx_job_page(g->job, luxel, &texel);
-    lx_texel t;
-    lx_texel_open(&t, g->bake, page, texel);
     lx_ray rays[places];
     lx_hit hits[places];
     lx_shading shading[places];
     for (uint32_t k = 0; k < places; ++k) {
         lx_receiver r;
-        const lx_piece *piece = lx_texel_site(&t, k * (lx_site_count / places), &r);
-        const lx_fragment *f = &t.fragments[piece->fragment];
+        const lx_piece *piece = lx_texel_site(t, k * (lx_site_count / places), &r);
+        const lx_fragment *f = &t->fragments[piece->fragment];
         const lx_vec2 b = lx_piece_barycentrics(piece, r.position);
         rays[k] = (lx_ray){.origin = r.position, .direction = lx_neg(r.geometric_normal), .t_max = 1};
         hits[k] = (lx_hit){.surface = f->surface, .triangle = f->triangle, .u = b.x, .v = b.y};
@@ -48,7 +44,9 @@ static lx_gather_luxel describe(const lx_gather_job *g, uint32_t luxel, const lx
 {
     uint32_t texel;
     const lx_luxel_page *page = lx_job_page(g->job, luxel, &texel);
-    lx_gather_luxel out = {.albedo = mean_albedo(g, luxel), .centre = first_site->position, .reach = near_source_texels * lx_luxel_size(g->bake, page, texel)};
+    lx_texel t;
+    lx_texel_open(&t, g->bake, page, texel);
+    lx_gather_luxel out = {.albedo = mean_albedo(g, &t), .centre = first_site->position, .reach = near_source_texels * lx_texel_piece(&t, 0)->texel_m};
     for (uint32_t s = 0; s < g->bake->source_count && !out.near_some; ++s) out.near_some = g->uses[s].layer >= 0 && lx_gather_is_near(g->bake->tracer, &out, s);
     return out;
 }
@@ -68,8 +66,7 @@ static void add_source(const lx_gather_job *g, lx_gather_scratch *s, uint32_t so
     for (uint32_t cell = 0; cell < cells; ++cell) {
         const uint32_t layer = (uint32_t)use->layer + (use->cells ? 0 : cell);
         const lx_rgb weight = use->cells ? lx_rgb_mul(use->weight, use->cells[cell]) : use->weight;
-        const float grey_weight = (weight.r + weight.g + weight.b) / 3;
-        const float unit = g->scales[layer];
+        const float grey_weight = lx_rgb_mean(weight), unit = g->scales[layer];
         lx_estimate *estimates = g->direct + (size_t)layer * g->luxel_count;
         for (uint32_t i = 0; i < s->count; ++i) {
             const lx_rgb e = lx_rgb_mul(s->mean[(size_t)cell * s->count + i], weight);
@@ -230,8 +227,8 @@ static lx_result light_tile(void *user, size_t task, uint32_t worker, lx_error *
     memset(s->sums, 0, row_values * sizeof *s->sums);
     memset(s->alone, 0, s->count);
     memset(s->sky_light, 0, s->count * sizeof *s->sky_light);
-    for (uint32_t i = 0; g->settings.bounces > 0 && i < s->count; ++i) g->luxels[s->luxel[i]] = describe(g, s->luxel[i], &s->sites[(size_t)i * lx_site_count]);
     const bool bounces = g->settings.bounces > 0;
+    for (uint32_t i = 0; bounces && i < s->count; ++i) g->luxels[s->luxel[i]] = describe(g, s->luxel[i], &s->sites[(size_t)i * lx_site_count]);
     if (bounces || g->interpolates || g->samples_sky) { // direct light must know as well
         memset(s->met, 0, row_values * sizeof *s->met);
         memset(s->near_light, 0, row_values * sizeof *s->near_light);
@@ -242,9 +239,8 @@ static lx_result light_tile(void *user, size_t task, uint32_t worker, lx_error *
     }
     if (bounces) {
         const float ray_unit = LX_ROW_UNIT / (float)g->pass_rays;
-        for (uint32_t i = 0; i < s->count; ++i) {
+        for (uint32_t i = 0; i < s->count; ++i)
             reflect(g, s->luxel[i], s->sums + g->stride * i, ray_unit, NULL, g->rows[1] + g->stride * s->luxel[i]); // the first pass adds it
-        }
         for (size_t i = 0; i < s->count; ++i)
             for (size_t k = g->stride * i; k < g->stride * (i + 1); ++k) {
                 s->sums[k] = s->alone[i] ? 0 : s->met[k] * ray_unit;

@@ -95,11 +95,6 @@ typedef struct lx_gather_job {
     lx_gather_settings settings;
 } lx_gather_job;
 
-static inline float lx_rgb_mean(lx_rgb c)
-{
-    return (c.r + c.g + c.b) / 3;
-}
-
 /// Are bounces counted, rather than gone on with until no layer gains what counts?
 static inline bool lx_gather_is_truncated(const lx_gather_job *g)
 {

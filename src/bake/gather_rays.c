@@ -405,6 +405,12 @@ static void add_rows(lx_gather_batch *b, const lx_gather_settings *settings, con
     }
 }
 
+static flight first_flight(const lx_gather_start *start, float cosine)
+{
+    return (flight){.throughput = {1, 1, 1}, .cosine = cosine, .stream = start->stream, .sample = start->sample, .target = start->target,
+                    .last_surface = LX_MISS, .from = LX_NO_LUXEL};
+}
+
 static void fetch_triangle(const lx_lookup *lookup, const lx_hit *hit)
 {
     if (hit->surface == LX_MISS) return;
@@ -440,8 +446,7 @@ static void first_hits(lx_gather_batch *b, const lx_gather_settings *settings, c
             b->pending[pending_count++] = (pending){taps, (uint32_t)i, near};
             continue;
         }
-        const flight f = {.throughput = {1, 1, 1}, .cosine = b->cosines[i], .stream = start->stream, .sample = start->sample,
-                          .target = start->target, .last_surface = LX_MISS, .from = LX_NO_LUXEL};
+        const flight f = first_flight(start, b->cosines[i]);
         send(b, &b->rays[i], hit, &f);
     }
     size_t found_count = 0;
@@ -450,8 +455,7 @@ static void first_hits(lx_gather_batch *b, const lx_gather_settings *settings, c
         const lx_gather_start *start = &starts[b->found[i]];
         const uint32_t luxel = lx_lookup_luxel(settings->lookup, b->pending[k].taps);
         if (luxel == LX_NO_LUXEL || b->pending[k].near) {
-            const flight f = {.throughput = {1, 1, 1}, .cosine = b->cosines[i], .stream = start->stream, .sample = start->sample,
-                              .target = start->target, .last_surface = LX_MISS, .from = LX_NO_LUXEL};
+            const flight f = first_flight(start, b->cosines[i]);
             if (luxel == LX_NO_LUXEL)
                 send(b, &b->rays[i], &b->hits[i], &f);
             else
@@ -494,16 +498,17 @@ static bool make_vertex(flight *f, const lx_shading *s, vertex_record *out)
 
 // What is known of a hit of the second loop.
 typedef struct answer {
-    uint32_t luxel; // that lies there; LX_NO_LUXEL: none
-    bool is_near;   // so near that its mean says little: the path goes on
+    uint32_t luxel; // that lies there; LX_NO_LUXEL: none, or one that says nothing
+    bool is_near;   // so near that it tells of direct light at most: the path goes on
 } answer;
 
 static answer slow_lookup(const lx_gather_settings *settings, const flight *f, const lx_hit *hit)
 {
     const lx_lookup_surface *surface = &settings->lookup->surfaces[hit->surface];
     if (hit->back || !surface->triangles || surface->triangles[hit->triangle].chart == LX_NO_CHART) return (answer){LX_NO_LUXEL, false};
-    const uint32_t luxel = lx_lookup_luxel(settings->lookup, lx_lookup_taps(settings->lookup, hit, tap_bits(f->stream, f->vertex, f->sample)));
-    return (answer){luxel, hit->t < settings->near_texels * surface->texel_m && f->vertex < near_until};
+    const bool is_near = hit->t < settings->near_texels * surface->texel_m && f->vertex < near_until;
+    if (is_near && !settings->rows_direct) return (answer){LX_NO_LUXEL, true};
+    return (answer){lx_lookup_luxel(settings->lookup, lx_lookup_taps(settings->lookup, hit, tap_bits(f->stream, f->vertex, f->sample))), is_near};
 }
 
 
@@ -532,7 +537,8 @@ static lx_result finish_simple(lx_gather_batch *b, const lx_gather_settings *set
         const flight *f = &b->flights[i];
         const lx_hit *hit = &b->slow_hits[i];
         if (hit->surface == LX_MISS) {
-            if (settings->tracer->sky.present && brings(settings, f, settings->tracer->source_count - 1)) add_sky(settings, out, f->throughput, f->cosine, f->target, b->slow_rays[i].direction, f->vertex);
+            if (brings(settings, f, settings->tracer->source_count - 1)) // the sky, if there is one
+                add_sky(settings, out, f->throughput, f->cosine, f->target, b->slow_rays[i].direction, f->vertex);
             continue;
         }
         const lx_lookup_surface *surface = &settings->lookup->surfaces[hit->surface];
@@ -543,7 +549,7 @@ static lx_result finish_simple(lx_gather_batch *b, const lx_gather_settings *set
                 result = find_slow_row(b, settings, f, known.luxel, out, error);
                 continue;
             }
-            if (known.luxel != LX_NO_LUXEL && settings->rows_direct) {
+            if (known.luxel != LX_NO_LUXEL) {
                 leave_near(b, settings, *f, hit, known.luxel);
                 continue;
             }

@@ -19,6 +19,7 @@ typedef struct lx_gather_luxel {
     bool near_some;   ///< There are some.
 } lx_gather_luxel;
 
+/// Is a source so near the luxel that its light differs too much over it? Never of one that is everywhere.
 bool lx_gather_is_near(const lx_tracer *tracer, const lx_gather_luxel *luxel, uint32_t source);
 
 typedef struct lx_gather_settings {
@@ -33,7 +34,7 @@ typedef struct lx_gather_settings {
     const uint16_t *rows;       ///< [luxel][3][row_layers] what a first hit reads: all bounces but one. NULL: nothing (or recorded, see below).
     const uint16_t *rows_later; ///< What later hits read: all bounces but two.
     const uint16_t *rows_direct; ///< Light straight from sources that are not near, for hits too near for all light to be looked up. NULL: they get light samples.
-    const lx_gather_luxel *luxels;
+    const lx_gather_luxel *luxels; ///< [luxel], for rows_direct and near_met.
     const uint8_t *sky_weight;  ///< [target] samples that share the light of a uniform sky with a first ray (lx_direct_tile). NULL: none do.
     float near_texels;          ///< Hits nearer than so many texels of their surface are not looked up.
 } lx_gather_settings;
@@ -60,8 +61,8 @@ typedef struct lx_gather_output {
     float *sums;             ///< [target][3][row_layers], added to.
     float *met;              ///< Likewise, what the first rays themselves meet of light sources. NULL: that goes to `sums` too.
     lx_rgb *sky_light;       ///< [target] added to: what first rays meet of the sky, without weight. NULL: not wanted.
-    float *near_met;         ///< Likewise, of emissive sources that are near luxel `targets`[target]. NULL: that goes to `met`.
-    const uint32_t *targets;
+    float *near_met;         ///< As `met`, of emissive sources that are near luxel `targets`[target]. NULL: that goes to `met`.
+    const uint32_t *targets; ///< [target] its luxel, beside near_met.
     float *distances;        ///< [start] to the first hit; INFINITY: none. NULL: not wanted.
     uint32_t *luxels;        ///< Recording (no rows are read): [start] luxel that the first hit may be looked up at, else LX_NO_LUXEL. NULL: rows are added.
     lx_gather_extras *extras; ///< Recording: later hits.

@@ -64,6 +64,7 @@ static inline float lx_clamp(float x, float low, float high) { return x < low ? 
 
 static inline lx_rgb lx_rgb_of(float r, float g, float b) { return (lx_rgb){r, g, b}; }
 static inline lx_rgb lx_rgb_grey(float v) { return (lx_rgb){v, v, v}; }
+static inline float lx_rgb_mean(lx_rgb c) { return (c.r + c.g + c.b) / 3; }
 static inline lx_rgb lx_rgb_add(lx_rgb a, lx_rgb b) { return (lx_rgb){a.r + b.r, a.g + b.g, a.b + b.b}; }
 static inline lx_rgb lx_rgb_mul(lx_rgb a, lx_rgb b) { return (lx_rgb){a.r * b.r, a.g * b.g, a.b * b.b}; }
 static inline lx_rgb lx_rgb_scale(lx_rgb a, float s) { return (lx_rgb){a.r * s, a.g * s, a.b * s}; }

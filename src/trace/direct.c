@@ -452,6 +452,13 @@ static void add_unshadowed(job *j, uint32_t luxel, uint32_t first, uint32_t end,
     }
 }
 
+// How many samples come first, so that growing fourfold leads to `most`.
+static uint32_t first_step(uint32_t most)
+{
+    while (most % runs == 0 && most / runs >= lx_direct_sites) most /= runs;
+    return most;
+}
+
 // What were four runs is the first of the next four.
 static void join_runs(float sums[runs])
 {
@@ -473,7 +480,7 @@ static void sum_evenly_lit(job *j, uint32_t luxel, lx_rgb *mean, float *variance
     const uint32_t most = most_samples(j, luxel);
     uint32_t samples = most, done = 0;
     clear_sums(j, 1);
-    while (j->cells == 1 && samples % runs == 0 && samples / runs >= lx_direct_sites) samples /= runs;
+    if (j->cells == 1) samples = first_step(samples);
     for (;; samples *= runs) {
         add_unshadowed(j, luxel, done, samples, samples);
         if (samples == most || is_fine(j, samples)) break;
@@ -564,7 +571,7 @@ bool lx_direct_light(lx_direct_batch *b, const lx_direct_settings *settings, con
     j.noise = settings->noise;
     j.least = darkest * 20 * tracer->source_scales[source]; // which are a twentieth of the mean
     // A monitor's cells must each be sure; and without a bound nothing ends early.
-    while (j.cells == 1 && j.noise > 0 && j.first_samples % runs == 0 && j.first_samples / runs >= lx_direct_sites) j.first_samples /= runs;
+    if (j.cells == 1 && j.noise > 0) j.first_samples = first_step(j.first_samples);
     memset(b->luxels, 0, tile->count * sizeof *b->luxels);
     if (!settings->all_rays && !j.is_uniform_sky) {
         place_on_grid(b, tile);
