@@ -137,8 +137,8 @@ static lx_result allocate(lx_gather_job *g, lx_error *error)
     g->closeness = lx_calloc_array(luxels, sizeof *g->closeness);
     g->spacing = lx_calloc_array(luxels, sizeof *g->spacing);
     g->sky_weight = lx_calloc_array(luxels, sizeof *g->sky_weight);
-    for (int i = 0; i < 3; ++i) g->rows[i] = lx_calloc_array(i < 2 || lx_gather_is_truncated(g) ? cached : 0, g->stride * sizeof *g->rows[i]);
-    g->rows_direct = lx_calloc_array(cached, g->stride * sizeof *g->rows_direct);
+    for (int i = 0; i < 3; ++i) g->rows[i] = lx_malloc_array(i < 2 || lx_gather_is_truncated(g) ? cached : 0, g->row_stride * sizeof *g->rows[i]);
+    g->rows_direct = lx_malloc_array(cached, g->row_stride * sizeof *g->rows_direct);
     g->hits = lx_malloc_array(cached, g->pass_rays * sizeof *g->hits);
     g->extras = lx_calloc_array(tiles, sizeof *g->extras);
     g->direct = lx_calloc_array(luxels, layers * sizeof *g->direct);
@@ -222,7 +222,7 @@ static void find_authored(lx_gather_job *g)
     }
 }
 
-// Luxels that answer for what is hit on them: valid ones, unless they reach into two rooms.
+// Luxels that answer for what is hit on them: valid ones, unless they reach into two rooms or under something low.
 static lx_result choose_answers(lx_gather_job *g, lx_error *error)
 {
     const lx_bake_map *map = &g->job->map;
@@ -233,7 +233,7 @@ static lx_result choose_answers(lx_gather_job *g, lx_error *error)
         const lx_luxel_page *page = lx_job_page(g->job, i, &texel);
         answers[i] = map->valid[i] && lx_luxel_is_whole(g->bake, page, texel);
     }
-    lx_lookup_invalidate(&g->lookup, &map->view, answers);
+    lx_lookup_silence(&g->lookup, &map->view, answers);
     lx_free(answers);
     return LX_OK;
 }
@@ -256,6 +256,7 @@ static lx_result bake_group(lx_bake_job *job, uint32_t first, uint32_t count, lx
     lx_gather_job g = {.job = job, .bake = bake, .uses = uses, .first_layer = first, .layer_count = count, .row_layers = lx_row_layers(count), .sums = sums,
                     .luxel_count = job->map.view.count, .pass_rays = samples < 128 ? 16 : lx_gather_most_pass_rays};
     g.stride = 3 * (size_t)g.row_layers;
+    g.row_stride = lx_row_stride(g.row_layers);
     g.settings.bounces = bounces;
     g.interpolates = bake->desc.interpolation > 0;
     g.samples_sky = lx_sky_is_uniform(&bake->tracer->sky) && uses[bake->source_count - 1].layer >= 0;

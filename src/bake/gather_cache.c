@@ -47,7 +47,8 @@ static lx_gather_luxel describe(const lx_gather_job *g, uint32_t luxel, const lx
     lx_texel t;
     lx_texel_open(&t, g->bake, page, texel);
     lx_gather_luxel out = {.albedo = mean_albedo(g, &t), .centre = first_site->position, .reach = near_source_texels * lx_texel_piece(&t, 0)->texel_m};
-    for (uint32_t s = 0; s < g->bake->source_count && !out.near_some; ++s) out.near_some = g->uses[s].layer >= 0 && lx_gather_is_near(g->bake->tracer, &out, s);
+    for (uint32_t s = 0; s < g->bake->source_count; ++s)
+        if (g->uses[s].layer >= 0 && lx_gather_is_near(g->bake->tracer, &out, s)) out.near_sources |= (uint64_t)1 << s % 64;
     return out;
 }
 
@@ -55,7 +56,7 @@ static lx_gather_luxel describe(const lx_gather_job *g, uint32_t luxel, const lx
 
 static bool is_near(const lx_gather_job *g, uint32_t luxel, uint32_t source)
 {
-    return g->settings.bounces > 0 && g->luxels[luxel].near_some && lx_gather_is_near(g->bake->tracer, &g->luxels[luxel], source);
+    return g->settings.bounces > 0 && g->luxels[luxel].near_sources && lx_gather_is_near(g->bake->tracer, &g->luxels[luxel], source);
 }
 
 // Adds a source's direct light to its layers: to the estimates if it counts there, to the cache's rows always.
@@ -240,7 +241,7 @@ static lx_result light_tile(void *user, size_t task, uint32_t worker, lx_error *
     if (bounces) {
         const float ray_unit = LX_ROW_UNIT / (float)g->pass_rays;
         for (uint32_t i = 0; i < s->count; ++i)
-            reflect(g, s->luxel[i], s->sums + g->stride * i, ray_unit, NULL, g->rows[1] + g->stride * s->luxel[i]); // the first pass adds it
+            reflect(g, s->luxel[i], s->sums + g->stride * i, ray_unit, NULL, g->rows[1] + g->row_stride * s->luxel[i]); // the first pass adds it
         for (size_t i = 0; i < s->count; ++i)
             for (size_t k = g->stride * i; k < g->stride * (i + 1); ++k) {
                 s->sums[k] = s->alone[i] ? 0 : s->met[k] * ray_unit;
@@ -249,12 +250,12 @@ static lx_result light_tile(void *user, size_t task, uint32_t worker, lx_error *
     }
     light_from_sources(g, s);
     for (uint32_t i = 0; bounces && i < s->count; ++i) {
-        const size_t row = g->stride * s->luxel[i];
+        const size_t row = g->row_stride * s->luxel[i];
         float *sums = s->sums + g->stride * i;
         const float *near_light = s->near_light + g->stride * i;
         reflect(g, s->luxel[i], sums, 1, NULL, g->rows_direct + row);
         for (size_t k = 0; k < g->stride; ++k) sums[k] += near_light[k];
-        reflect(g, s->luxel[i], sums, 1, g->radiosity + row, g->rows[0] + row);
+        reflect(g, s->luxel[i], sums, 1, g->radiosity + g->stride * s->luxel[i], g->rows[0] + row);
     }
     return LX_OK;
 }
@@ -285,16 +286,16 @@ static lx_result pass_tile(void *user, size_t task, uint32_t worker, lx_error *e
         memset(sums, 0, g->stride * sizeof *sums);
         const uint32_t *hits = g->hits + (size_t)i * g->pass_rays;
         for (uint32_t k = 0; k < g->pass_rays; ++k)
-            if (hits[k] != LX_NO_LUXEL) __builtin_prefetch(from + g->stride * hits[k]);
+            if (hits[k] != LX_NO_LUXEL) lx_row_fetch(from + g->row_stride * hits[k], g->stride);
         for (uint32_t k = 0; k < g->pass_rays; ++k)
-            if (hits[k] != LX_NO_LUXEL) lx_row_add(sums, from + g->stride * hits[k], g->stride);
+            if (hits[k] != LX_NO_LUXEL) lx_row_add(sums, from + g->row_stride * hits[k], g->stride);
         for (; extra < extras->count && extras->items[extra].target == i; ++extra) {
             const lx_gather_extra *e = &extras->items[extra];
             const float weight[3] = {e->weight.r, e->weight.g, e->weight.b};
-            lx_row_add_scaled(sums, from_later + g->stride * e->luxel, g->row_layers, weight);
+            lx_row_add_scaled(sums, from_later + g->row_stride * e->luxel, g->row_layers, weight);
         }
         float *radiosity = g->radiosity + g->stride * i;
-        uint16_t *row = g->rows[1] + g->stride * i;
+        uint16_t *row = g->rows[1] + g->row_stride * i;
         const lx_rgb a = g->luxels[i].albedo;
         const float factor[3] = {a.r * LX_ROW_UNIT * unit, a.g * LX_ROW_UNIT * unit, a.b * LX_ROW_UNIT * unit};
         for (size_t c = 0; c < 3; ++c)
@@ -323,10 +324,15 @@ static lx_result sum_rows(void *user, size_t task, uint32_t worker, lx_error *er
     const lx_gather_job *g = user;
     const lx_luxel_tile *tile = &g->job->map.tiles[task];
     const bool truncated = lx_gather_is_truncated(g);
-    for (size_t i = g->stride * tile->first; i < g->stride * ((size_t)tile->first + tile->count); ++i) {
-        const float last = truncated ? lx_row_decode_small(g->rows[0][i]) * LX_ROW_UNIT : 0;
-        g->rows[0][i] = lx_row_encode(g->radiosity[i]);
-        if (truncated) g->rows[1][i] = lx_row_encode(g->radiosity[i] - last);
+    for (uint32_t i = tile->first; i < tile->first + tile->count; ++i) {
+        if (!g->job->map.valid[i]) continue;
+        const float *radiosity = g->radiosity + g->stride * i;
+        uint16_t *all = g->rows[0] + g->row_stride * i, *without_last = g->rows[1] + g->row_stride * i;
+        for (size_t k = 0; k < g->stride; ++k) {
+            const float last = truncated ? lx_row_decode_small(all[k]) * LX_ROW_UNIT : 0;
+            all[k] = lx_row_encode(radiosity[k]);
+            if (truncated) without_last[k] = lx_row_encode(radiosity[k] - last);
+        }
     }
     return LX_OK;
 }

@@ -60,7 +60,7 @@ typedef struct lx_gather_job {
     const lx_bake *bake;
     const lx_source_use *uses;
     uint32_t first_layer, layer_count, row_layers;
-    size_t stride;          // values of a row
+    size_t stride, row_stride; // values of a row of sums, and from one row of the cache to the next
     uint32_t luxel_count;
     lx_lookup lookup;
     float *scales;          // [row_layers]
@@ -72,9 +72,9 @@ typedef struct lx_gather_job {
     bool interpolates;
     bool samples_sky;       // it is of one colour
     float *radiosity;       // [luxel][3][row_layers] of all passes so far, times scale; until gathering begins it lives where `indirect` will
-    uint16_t *rows[3];      // [luxel][3][row_layers] what the last pass added, what the next one will, and with a number of bounces what the pass before the last added;
+    uint16_t *rows[3];      // [luxel][row_stride], of them [3][row_layers]: what the last pass added, what the next one will, and with a number of bounces what the pass before the last added;
                             // in the end what gather rays read
-    uint16_t *rows_direct;  // [luxel][3][row_layers] light straight from sources that are not near
+    uint16_t *rows_direct;  // likewise, light straight from sources that are not near
     uint32_t pass;          // passes so far
     uint32_t pass_rays;
     uint32_t *hits;         // [luxel][pass_rays]

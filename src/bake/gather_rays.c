@@ -12,7 +12,7 @@
 
 enum {
     batch_size = lx_gather_batch_size,
-    look_ahead = 24,       // rows that are fetched before they are added
+    look_ahead = 48,       // rows that are fetched before they are added
     triangles_ahead = 16,  // of the lookup, before they are read
     near_until = 4,        // vertices; paths caught in a corner are looked up all the same
     most_passes = 256,     // surfaces one ray may pass through
@@ -63,10 +63,10 @@ struct lx_gather_batch {
     lx_shading shading[2 * batch_size];
     size_t slow_count;
     // Rays of the second loop that are still to be traced.
-    lx_hit near_hits[2 * batch_size]; // they leave from here,
-    flight near[2 * batch_size];
-    lx_receiver near_receivers[2 * batch_size];
-    size_t near_count;
+    lx_hit leaving_hits[2 * batch_size]; // they leave from here,
+    flight leaving[2 * batch_size];
+    lx_receiver leaving_receivers[2 * batch_size];
+    size_t leaving_count;
     lx_ray onward_rays[2 * batch_size]; // and these are on their way
     flight onward[2 * batch_size];
     size_t onward_count;
@@ -138,7 +138,7 @@ static bool brings(const lx_gather_settings *settings, const flight *f, uint32_t
 {
     if (f->from == LX_NO_LUXEL) return true;
     const lx_gather_luxel *luxel = &settings->luxels[f->from];
-    return luxel->near_some && lx_gather_is_near(settings->tracer, luxel, source);
+    return (luxel->near_sources >> source % 64 & 1) && lx_gather_is_near(settings->tracer, luxel, source);
 }
 
 static void add_sky(const lx_gather_settings *settings, const lx_gather_output *out, lx_rgb throughput, float cosine, uint32_t target,
@@ -156,19 +156,21 @@ static void add_sky(const lx_gather_settings *settings, const lx_gather_output *
 }
 
 static void add_emission(const lx_gather_settings *settings, const lx_gather_output *out, const flight *f, const lx_ray *ray, const lx_hit *hit,
-                         const lx_shading *s)
+                         lx_rgb emission)
 {
     const int32_t source = settings->tracer->scene->surfaces[hit->surface].source;
-    if (source < 0 || lx_rgb_is_black(s->emission)) return;
+    if (source < 0 || lx_rgb_is_black(emission)) return;
     const lx_source_use *use = &settings->uses[source];
     if (!counts(settings, use, f->vertex) || !brings(settings, f, (uint32_t)source)) return;
     const lx_tracer *tracer = settings->tracer;
     const uint32_t samples = f->vertex == 0 ? lx_direct_sample_weight(tracer, (uint32_t)source) : 1;
-    const float weight = lx_hit_weight(tracer, ray, hit, s->geometric_normal, f->cosine, samples);
+    lx_vec3 position, normal;
+    lx_hit_geometry(tracer, hit, &position, &normal);
+    const float weight = lx_hit_weight(tracer, ray, hit, normal, f->cosine, samples);
     const uint32_t cell = lx_tracer_cell_at(tracer, hit->surface, hit->triangle, hit->u, hit->v);
     const bool near = f->vertex == 0 && out->near_met && lx_gather_is_near(tracer, &settings->luxels[out->targets[f->target]], (uint32_t)source);
     add_light(settings, near ? out->near_met : sums_for(out, f->vertex), f->target, use, cell,
-              lx_rgb_scale(lx_rgb_mul(f->throughput, s->emission), LX_PI * weight));
+              lx_rgb_scale(lx_rgb_mul(f->throughput, emission), LX_PI * weight));
 }
 
 // ---- directions -------------------------------------------------------------------------------------------------------------------
@@ -258,7 +260,7 @@ static void next_events(lx_gather_batch *b, const lx_gather_settings *settings, 
     }
 }
 
-// ---- hits that are too near -------------------------------------------------------------------------------------------------------
+// ---- paths that go on -------------------------------------------------------------------------------------------------------------
 
 // A ray goes on from `receiver`, if not below its geometric surface; the flight is what it was when it got there.
 static void go_on(lx_gather_batch *b, const lx_receiver *receiver, flight f)
@@ -285,48 +287,54 @@ static bool survives(flight *f, lx_rgb albedo)
     return true;
 }
 
-static void fetch_row(const uint16_t *row, size_t stride)
-{
-    for (size_t k = 0; k < stride; k += 32) __builtin_prefetch(row + k);
-}
-
 static void note_row(lx_gather_batch *b, const uint16_t *rows, const lx_gather_settings *settings, const flight *f, uint32_t luxel)
 {
-    b->slow_rows[b->slow_row_count++] = (slow_row){rows + 3 * (size_t)settings->row_layers * luxel, f->target, f->throughput};
+    b->slow_rows[b->slow_row_count++] = (slow_row){rows + lx_row_stride(settings->row_layers) * luxel, f->target, f->throughput};
 }
 
 static void add_slow_rows(lx_gather_batch *b, const lx_gather_settings *settings, const lx_gather_output *out)
 {
-    const size_t stride = 3 * (size_t)settings->row_layers;
+    const size_t count = 3 * (size_t)settings->row_layers;
     for (size_t i = 0; i < b->slow_row_count; ++i) {
-        if (i + look_ahead < b->slow_row_count) fetch_row(b->slow_rows[i + look_ahead].row, stride);
+        if (i + look_ahead < b->slow_row_count) lx_row_fetch(b->slow_rows[i + look_ahead].row, count);
         const slow_row *r = &b->slow_rows[i];
         const float factor[3] = {r->weight.r, r->weight.g, r->weight.b};
-        lx_row_add_scaled(out->sums + stride * r->target, r->row, settings->row_layers, factor);
+        lx_row_add_scaled(out->sums + count * r->target, r->row, settings->row_layers, factor);
     }
     b->slow_row_count = 0;
 }
 
-// A plain hit too near for all light to be looked up: light straight from the sources is, and a ray goes on for the rest.
-static void leave_near(lx_gather_batch *b, const lx_gather_settings *settings, flight f, const lx_hit *hit, uint32_t luxel)
+// The path goes on from a hit, if it does. `from`: the luxel that light straight from the sources was taken of.
+static void leave(lx_gather_batch *b, flight f, const lx_hit *hit, lx_rgb albedo, uint32_t from)
 {
-    note_row(b, settings->rows_direct, settings, &f, luxel);
-    if (!survives(&f, settings->luxels[luxel].albedo)) return;
-    f.from = luxel;
-    b->near_hits[b->near_count] = *hit;
-    b->near[b->near_count++] = f;
+    if (!survives(&f, albedo)) return;
+    f.from = from;
+    b->leaving_hits[b->leaving_count] = *hit;
+    b->leaving[b->leaving_count++] = f;
 }
 
-static void leave_all_near(lx_gather_batch *b, const lx_gather_settings *settings, const lx_gather_output *out)
+// A plain hit that is too near for all light to be looked up, or on a silent luxel: its albedo is known. Too near, light straight from the sources is as well, and a ray goes
+// on for the rest. False: nothing is known.
+static bool leave_unshaded(lx_gather_batch *b, const lx_gather_settings *settings, const flight *f, const lx_hit *hit, uint32_t luxel)
+{
+    if (luxel == LX_NO_LUXEL || !settings->rows_direct) return false;
+    const bool is_silent = luxel >= LX_SILENT;
+    if (!is_silent) note_row(b, settings->rows_direct, settings, f, luxel);
+    leave(b, *f, hit, settings->luxels[luxel & ~LX_SILENT].albedo, is_silent ? LX_NO_LUXEL : luxel);
+    return true;
+}
+
+static void leave_all(lx_gather_batch *b, const lx_gather_settings *settings, const lx_gather_output *out)
 {
     size_t vertex_count = 0;
-    lx_hit_receivers(settings->tracer, b->near_hits, b->near_receivers, b->near_count);
-    for (size_t i = 0; i < b->near_count; ++i) {
-        if (settings->luxels[b->near[i].from].near_some) b->vertices[vertex_count++] = (vertex_record){b->near_receivers[i], b->near[i]};
-        go_on(b, &b->near_receivers[i], b->near[i]);
+    lx_hit_receivers(settings->tracer, b->leaving_hits, b->leaving_receivers, b->leaving_count);
+    for (size_t i = 0; i < b->leaving_count; ++i) {
+        const uint32_t from = b->leaving[i].from;
+        if (from == LX_NO_LUXEL || settings->luxels[from].near_sources) b->vertices[vertex_count++] = (vertex_record){b->leaving_receivers[i], b->leaving[i]};
+        go_on(b, &b->leaving_receivers[i], b->leaving[i]);
     }
     next_events(b, settings, vertex_count, out);
-    b->near_count = 0;
+    b->leaving_count = 0;
 }
 
 // ---- the first loop ----------------------------------------------------------------------------------------------------------------
@@ -398,10 +406,10 @@ static size_t make_rays(lx_gather_batch *b, const lx_gather_start *starts, size_
 
 static void add_rows(lx_gather_batch *b, const lx_gather_settings *settings, const lx_gather_output *out, size_t count)
 {
-    const size_t stride = 3 * (size_t)settings->row_layers;
+    const size_t values = 3 * (size_t)settings->row_layers, stride = lx_row_stride(settings->row_layers);
     for (size_t i = 0; i < count; ++i) {
-        if (i + look_ahead < count) fetch_row(settings->rows + stride * b->found[i + look_ahead], stride);
-        lx_row_add(out->sums + stride * b->found_target[i], settings->rows + stride * b->found[i], stride);
+        if (i + look_ahead < count) lx_row_fetch(settings->rows + stride * b->found[i + look_ahead], values);
+        lx_row_add(out->sums + values * b->found_target[i], settings->rows + stride * b->found[i], values);
     }
 }
 
@@ -442,7 +450,7 @@ static void first_hits(lx_gather_batch *b, const lx_gather_settings *settings, c
                                  surface->triangles[hit->triangle].chart != LX_NO_CHART;
         if (may_look_up) {
             const lx_taps taps = lx_lookup_taps(settings->lookup, hit, tap_bits(start->stream, 0, start->sample));
-            __builtin_prefetch(&settings->lookup->places[taps.tap]);
+            lx_lookup_fetch(settings->lookup, taps);
             b->pending[pending_count++] = (pending){taps, (uint32_t)i, near};
             continue;
         }
@@ -454,12 +462,9 @@ static void first_hits(lx_gather_batch *b, const lx_gather_settings *settings, c
         const uint32_t i = b->pending[k].index;
         const lx_gather_start *start = &starts[b->found[i]];
         const uint32_t luxel = lx_lookup_luxel(settings->lookup, b->pending[k].taps);
-        if (luxel == LX_NO_LUXEL || b->pending[k].near) {
+        if (luxel >= LX_SILENT || b->pending[k].near) {
             const flight f = first_flight(start, b->cosines[i]);
-            if (luxel == LX_NO_LUXEL)
-                send(b, &b->rays[i], &b->hits[i], &f);
-            else
-                leave_near(b, settings, f, &b->hits[i], luxel);
+            if (!leave_unshaded(b, settings, &f, &b->hits[i], luxel)) send(b, &b->rays[i], &b->hits[i], &f);
         } else if (out->luxels) {
             out->luxels[first_start + b->found[i]] = luxel;
         } else { // in place: found_count <= i
@@ -470,35 +475,27 @@ static void first_hits(lx_gather_batch *b, const lx_gather_settings *settings, c
     }
     if (settings->rows && !out->luxels) add_rows(b, settings, out, found_count);
     add_slow_rows(b, settings, out);
-    leave_all_near(b, settings, out);
+    leave_all(b, settings, out);
 }
 
 // ---- the second loop -----------------------------------------------------------------------------------------------------------------
 
 // Decides at a surface that lets light through: true if the ray goes straight on. The flight's throughput pays for the choice.
-static bool passes_on(flight *f, const lx_shading *s)
+static bool passes_on(flight *f, const lx_shading *m)
 {
-    const float straight = lx_rgb_max(s->transmittance);
+    const float straight = lx_rgb_max(m->transmittance);
     if (straight == 0) return false;
-    const float probability = straight / (straight + s->opacity);
+    const float probability = straight / (straight + m->opacity);
     const uint32_t key = dimension_key(f->stream, f->vertex, dimension_pass + 8 * (f->passes + 1));
     const bool pass = lx_sobol_one(f->sample, key) < probability;
-    f->throughput = pass ? lx_rgb_mul(f->throughput, lx_rgb_scale(s->transmittance, 1 / probability))
-                         : lx_rgb_scale(f->throughput, s->opacity / (1 - probability));
+    f->throughput = pass ? lx_rgb_mul(f->throughput, lx_rgb_scale(m->transmittance, 1 / probability))
+                         : lx_rgb_scale(f->throughput, m->opacity / (1 - probability));
     return pass;
-}
-
-static bool make_vertex(flight *f, const lx_shading *s, vertex_record *out)
-{
-    if (!survives(f, s->albedo)) return false;
-    const float side = s->front ? 1.0f : -1.0f;
-    *out = (vertex_record){.receiver = {s->position, lx_scale(s->normal, side), lx_scale(s->geometric_normal, side)}, .flight = *f};
-    return true;
 }
 
 // What is known of a hit of the second loop.
 typedef struct answer {
-    uint32_t luxel; // that lies there; LX_NO_LUXEL: none, or one that says nothing
+    uint32_t luxel; // that lies there, a silent one perhaps; LX_NO_LUXEL: none
     bool is_near;   // so near that it tells of direct light at most: the path goes on
 } answer;
 
@@ -545,14 +542,11 @@ static lx_result finish_simple(lx_gather_batch *b, const lx_gather_settings *set
         if (surface->plain) {
             if ((hit->back && !surface->double_sided) || f->vertex >= settings->bounces) continue; // black
             const answer known = slow_lookup(settings, f, hit);
-            if (known.luxel != LX_NO_LUXEL && !known.is_near) {
+            if (known.luxel < LX_SILENT && !known.is_near) {
                 result = find_slow_row(b, settings, f, known.luxel, out, error);
                 continue;
             }
-            if (known.luxel != LX_NO_LUXEL) {
-                leave_near(b, settings, *f, hit, known.luxel);
-                continue;
-            }
+            if (leave_unshaded(b, settings, f, hit, known.luxel)) continue;
         }
         b->flights[kept] = *f;
         b->slow_hits[kept] = *hit;
@@ -565,20 +559,20 @@ static lx_result finish_simple(lx_gather_batch *b, const lx_gather_settings *set
 // One step of all slow flights: from their hits to the hits of what follows.
 static lx_result step(lx_gather_batch *b, const lx_gather_settings *settings, const lx_gather_output *out, lx_error *error)
 {
-    size_t count = b->slow_count, vertex_count = 0, kept = 0;
+    size_t count = b->slow_count, kept = 0;
     lx_result result = finish_simple(b, settings, &count, out, error);
     if (result != LX_OK) return result;
-    lx_shade_hits(settings->tracer, b->slow_rays, b->slow_hits, b->shading, count);
+    lx_shade_materials(settings->tracer, b->slow_hits, b->shading, count);
     for (size_t i = 0; i < count; ++i) {
         flight f = b->flights[i];
         lx_ray ray = b->slow_rays[i];
         const lx_hit *hit = &b->slow_hits[i];
-        const lx_shading *s = &b->shading[i];
+        const lx_shading *m = &b->shading[i];
         const lx_lookup_surface *surface = &settings->lookup->surfaces[hit->surface];
         if (!surface->plain) {
             const bool again = hit->surface == f.last_surface && hit->triangle == f.last_triangle;
-            if (!again) add_emission(settings, out, &f, &ray, hit, s);
-            if (again || passes_on(&f, s)) {
+            if (!again) add_emission(settings, out, &f, &ray, hit, m->emission);
+            if (again || passes_on(&f, m)) {
                 if (++f.passes > most_passes) continue;
                 f.last_surface = hit->surface;
                 f.last_triangle = hit->triangle;
@@ -587,21 +581,18 @@ static lx_result step(lx_gather_batch *b, const lx_gather_settings *settings, co
                 b->slow_rays[kept++] = ray;
                 continue;
             }
-            if (!s->lit || f.vertex >= settings->bounces) continue;
+            if (!m->lit || f.vertex >= settings->bounces) continue;
             const answer known = slow_lookup(settings, &f, hit);
-            if (known.luxel != LX_NO_LUXEL && !known.is_near) {
+            if (known.luxel < LX_SILENT && !known.is_near) {
                 result = find_slow_row(b, settings, &f, known.luxel, out, error);
                 if (result != LX_OK) return result;
                 continue;
             }
         }
-        f.from = LX_NO_LUXEL;
-        if (make_vertex(&f, s, &b->vertices[vertex_count])) ++vertex_count;
+        leave(b, f, hit, m->albedo, LX_NO_LUXEL);
     }
     add_slow_rows(b, settings, out);
-    next_events(b, settings, vertex_count, out);
-    for (size_t i = 0; i < vertex_count; ++i) go_on(b, &b->vertices[i].receiver, b->vertices[i].flight);
-    leave_all_near(b, settings, out);
+    leave_all(b, settings, out);
     memcpy(b->slow_rays + kept, b->onward_rays, b->onward_count * sizeof *b->slow_rays);
     memcpy(b->flights + kept, b->onward, b->onward_count * sizeof *b->flights);
     kept += b->onward_count;
@@ -616,7 +607,7 @@ lx_result lx_gather_trace(lx_gather_batch *b, const lx_gather_settings *settings
                           const lx_gather_output *out, lx_error *error)
 {
     lx_result result = LX_OK;
-    b->slow_count = b->near_count = b->onward_count = b->slow_row_count = 0;
+    b->slow_count = b->leaving_count = b->onward_count = b->slow_row_count = 0;
     if (out->luxels)
         for (size_t i = 0; i < count; ++i) out->luxels[i] = LX_NO_LUXEL;
     for (size_t i = 0; out->distances && i < count; ++i) out->distances[i] = INFINITY;

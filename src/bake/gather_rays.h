@@ -16,7 +16,7 @@ typedef struct lx_gather_luxel {
     lx_rgb albedo;
     lx_vec3 centre;
     float reach;      ///< How far from the centre a source is near: light of such ones is in no row of direct light, for it differs too much over the luxel.
-    bool near_some;   ///< There are some.
+    uint64_t near_sources; ///< Bit s modulo 64: source s may be near.
 } lx_gather_luxel;
 
 /// Is a source so near the luxel that its light differs too much over it? Never of one that is everywhere.
@@ -31,7 +31,7 @@ typedef struct lx_gather_settings {
     uint32_t bounces;           ///< 0: only light sources are met.
     bool direct;                ///< Light sources met by the first ray count (those of mixed lights never, unless `everything`).
     bool everything;            ///< The cache's own rays: all light counts.
-    const uint16_t *rows;       ///< [luxel][3][row_layers] what a first hit reads: all bounces but one. NULL: nothing (or recorded, see below).
+    const uint16_t *rows;       ///< [luxel][lx_row_stride(row_layers)] what a first hit reads: all bounces but one. NULL: nothing (or recorded, see below).
     const uint16_t *rows_later; ///< What later hits read: all bounces but two.
     const uint16_t *rows_direct; ///< Light straight from sources that are not near, for hits too near for all light to be looked up. NULL: they get light samples.
     const lx_gather_luxel *luxels; ///< [luxel], for rows_direct and near_met.
@@ -68,7 +68,7 @@ typedef struct lx_gather_output {
     lx_gather_extras *extras; ///< Recording: later hits.
 } lx_gather_output;
 
-enum { lx_gather_batch_size = 2048 };
+enum { lx_gather_batch_size = 4096 };
 
 /// Working memory of one worker.
 typedef struct lx_gather_batch lx_gather_batch;

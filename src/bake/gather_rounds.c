@@ -35,24 +35,34 @@ static size_t make_starts(const lx_gather_job *g, lx_gather_scratch *s, uint32_t
     return count;
 }
 
-// Takes the round's sums of one layer into the estimate of one luxel. Returns how far the halves' means are apart.
-static float take_round(const lx_gather_job *g, const float *a, const float *b, float unit, lx_estimate *e)
+// How a round's sums of one layer, of its halves, become a part of an estimate.
+typedef struct round_weights {
+    float before, sum;  // of the estimate so far, and of what the halves add up to
+    float a, b;         // of the halves: their means of a channel, a third of it
+    float squared;      // of the square of the difference of these means
+} round_weights;
+
+static round_weights weigh_round(const lx_gather_job *g, float unit)
 {
     const uint32_t n = g->round_count, half = (n + 1) / 2;
-    const float before = (float)g->round_first, after = before + (float)n, old = before / after, new = unit / after;
-    const float of_a = unit / (float)half / 3, of_b = n > half ? unit / (float)(n - half) / 3 : 0;
-    float sum[3], difference = 0;
-    for (size_t c = 0; c < 3; ++c) {
-        const float x = a[c * g->row_layers], y = b[c * g->row_layers];
-        sum[c] = x + y;
-        difference += x * of_a - y * of_b;
-    }
-    if (n == half) difference = 0;
-    const float share = (float)n / after;
-    e->mean.r = e->mean.r * old + sum[0] * new;
-    e->mean.g = e->mean.g * old + sum[1] * new;
-    e->mean.b = e->mean.b * old + sum[2] * new;
-    e->variance = e->variance * (old * old) + difference * difference / 4 * (share * share);
+    const float before = (float)g->round_first, after = before + (float)n, share = (float)n / after;
+    round_weights w = {.before = before / after, .sum = unit / after};
+    if (n == half) return w; // one ray has no halves
+    w.a = unit / (float)half / 3;
+    w.b = unit / (float)(n - half) / 3;
+    w.squared = share * share / 4;
+    return w;
+}
+
+// Takes the round's sums of one layer into the estimate of one luxel. Returns how far the halves' means are apart.
+static inline float take_round(const round_weights *w, const float *a, const float *b, size_t layers, lx_estimate *e)
+{
+    const float a0 = a[0], a1 = a[layers], a2 = a[2 * layers], b0 = b[0], b1 = b[layers], b2 = b[2 * layers];
+    const float difference = (a0 + a1 + a2) * w->a - (b0 + b1 + b2) * w->b;
+    e->mean.r = e->mean.r * w->before + (a0 + b0) * w->sum;
+    e->mean.g = e->mean.g * w->before + (a1 + b1) * w->sum;
+    e->mean.b = e->mean.b * w->before + (a2 + b2) * w->sum;
+    e->variance = e->variance * (w->before * w->before) + difference * difference * w->squared;
     return difference;
 }
 
@@ -65,12 +75,13 @@ static void fold_block(const lx_gather_job *g, const lx_gather_tile *state, cons
         const lx_estimate *direct = g->direct + (size_t)l * g->luxel_count;
         lx_gather_halving *halvings = &g->halvings[(size_t)task * g->layer_count + l];
         lx_estimate *indirect = g->indirect + (size_t)l * g->luxel_count, *met = g->met[l];
+        const round_weights weights = weigh_round(g, unit);
         for (uint32_t i = from; i < end; ++i) {
             const size_t a = g->stride * (i - first) + l, b = a + g->stride * lx_gather_chunk_luxels;
             const uint32_t luxel = s->luxel[i];
             const lx_rgb before = indirect[luxel].mean;
-            const float difference = take_round(g, s->sums + a, s->sums + b, unit, &indirect[luxel]);
-            if (met) take_round(g, s->met + a, s->met + b, unit, &met[luxel]);
+            const float difference = take_round(&weights, s->sums + a, s->sums + b, g->row_layers, &indirect[luxel]);
+            if (met) take_round(&weights, s->met + a, s->met + b, g->row_layers, &met[luxel]);
             if (g->round_first == g->round_count) { // all samples before against as many: the mean moved half way from the ones to the others
                 const float moved = lx_rgb_mean(indirect[luxel].mean) - lx_rgb_mean(before), value = lx_max(lx_rgb_mean(direct[luxel].mean) + lx_rgb_mean(indirect[luxel].mean), least);
                 halvings->within += value > 0 ? (double)(difference * difference / 4) / ((double)value * (double)value) : 0;

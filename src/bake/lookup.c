@@ -22,8 +22,8 @@ static lx_result build_triangles(const lx_bake *bake, lx_lookup *out, lx_error *
         if (!a->corner_uv) continue;
         for (uint32_t t = 0; t < scene->primitives[p].triangle_count; ++t) {
             const lx_vec2 *c = a->corner_uv + 3 * (size_t)t;
-            out->triangles[first[p] + t] = (lx_lookup_triangle){c[0].x, c[0].y, c[1].x - c[0].x, c[1].y - c[0].y, c[2].x - c[0].x,
-                                                                c[2].y - c[0].y, a->triangle_chart[t]};
+            out->triangles[first[p] + t] = (lx_lookup_triangle){.u = c[0].x, .v = c[0].y, .u1 = c[1].x - c[0].x, .v1 = c[1].y - c[0].y,
+                                                                .u2 = c[2].x - c[0].x, .v2 = c[2].y - c[0].y, .chart = a->triangle_chart[t]};
         }
     }
     for (uint32_t s = 0; s < scene->surface_count; ++s) {
@@ -55,6 +55,7 @@ lx_result lx_lookup_create(const lx_bake *bake, const lx_luxel_map *map, lx_look
 {
     const lx_scene *scene = bake->scene;
     const lx_atlas *atlas = bake->atlas;
+    if (map->count >= LX_SILENT) return lx_fail(error, LX_ERROR_LIMIT, "%u texels are too many; fewer or smaller pages need less", map->count);
     const size_t texels = (size_t)map->page_size * map->page_size * map->page_count;
     lx_result result = LX_OK;
     uint32_t *first_chart = lx_calloc_array(scene->instance_count, sizeof *first_chart);
@@ -104,8 +105,8 @@ void lx_lookup_release(lx_lookup *lookup)
     *lookup = (lx_lookup){0};
 }
 
-void lx_lookup_invalidate(lx_lookup *lookup, const lx_luxel_map *map, const uint8_t *answers)
+void lx_lookup_silence(lx_lookup *lookup, const lx_luxel_map *map, const uint8_t *answers)
 {
     for (uint32_t i = 0; i < map->count; ++i)
-        if (!answers[i]) lookup->places[map->texel[i]].luxel = LX_NO_LUXEL;
+        if (!answers[i]) lookup->places[map->texel[i]].luxel = map->valid[i] ? i | LX_SILENT : LX_NO_LUXEL;
 }

@@ -5,10 +5,11 @@
 #include "bake/bake.h"
 #include "post/luxel_map.h"
 
-/// A triangle's lightmap coordinates in its mesh's unit square.
+/// A triangle's lightmap coordinates in its mesh's unit square. Two of them fill a cache line.
 typedef struct lx_lookup_triangle {
     float u, v, u1, v1, u2, v2; ///< Of corner 0, and the edges to corners 1 and 2.
     uint32_t chart;             ///< Within the mesh; LX_NO_CHART: no luxels.
+    uint32_t unused;
 } lx_lookup_triangle;
 
 typedef struct lx_lookup_surface {
@@ -20,9 +21,12 @@ typedef struct lx_lookup_surface {
     bool double_sided;
 } lx_lookup_surface;
 
+/// Beside a luxel's number: it lies there, but its light says nothing of what is hit there. Its albedo does.
+#define LX_SILENT 0x80000000u
+
 /// What covers a texel: with the chart beside the luxel one cache line answers.
 typedef struct lx_place {
-    uint32_t luxel, chart; ///< LX_NO_LUXEL: not covered, or not valid.
+    uint32_t luxel, chart; ///< The luxel that answers there, or a silent one; LX_NO_LUXEL: none.
 } lx_place;
 
 typedef struct lx_lookup {
@@ -32,7 +36,7 @@ typedef struct lx_lookup {
     uint32_t page_size;
 } lx_lookup;
 
-/// All texels of `map` count as valid until lx_lookup_invalidate.
+/// All luxels of `map` answer until lx_lookup_silence.
 lx_result lx_lookup_create(const lx_bake *bake, const lx_luxel_map *map, lx_lookup *out, lx_error *error);
 void lx_lookup_release(lx_lookup *lookup);
 
@@ -56,16 +60,28 @@ static inline lx_taps lx_lookup_taps(const lx_lookup *lookup, const lx_hit *hit,
     return (lx_taps){base + tap_y * lookup->page_size + tap_x, base + y0 * lookup->page_size + x0, s->first_chart + t->chart};
 }
 
-/// The luxel of the taps: within the chart and valid, else LX_NO_LUXEL.
+/// The luxel that answers for the taps, of their chart, or a silent one; LX_NO_LUXEL: none does. Where the texel that holds the hit says nothing, its neighbours say
+/// nothing of it either: they may lie on the other side of what it reaches under.
 static inline uint32_t lx_lookup_luxel(const lx_lookup *lookup, lx_taps taps)
 {
-    const lx_place tap = lookup->places[taps.tap];
-    if (tap.chart == taps.chart && tap.luxel != LX_NO_LUXEL) return tap.luxel;
-    const lx_place holder = lookup->places[taps.holder];
+    const lx_place tap = lookup->places[taps.tap], holder = lookup->places[taps.holder];
+    if (holder.chart == taps.chart && holder.luxel >= LX_SILENT) return holder.luxel;
+    if (tap.chart == taps.chart && tap.luxel < LX_SILENT) return tap.luxel;
     return holder.chart == taps.chart ? holder.luxel : LX_NO_LUXEL;
 }
 
-/// Luxels whose `answers` is false are never looked up.
-void lx_lookup_invalidate(lx_lookup *lookup, const lx_luxel_map *map, const uint8_t *answers);
+static inline void lx_lookup_fetch(const lx_lookup *lookup, lx_taps taps)
+{
+#if defined(__GNUC__)
+    __builtin_prefetch(&lookup->places[taps.tap]);
+    __builtin_prefetch(&lookup->places[taps.holder]);
+#else
+    (void)lookup;
+    (void)taps;
+#endif
+}
+
+/// Luxels whose `answers` is false fall silent, invalid ones are no longer there.
+void lx_lookup_silence(lx_lookup *lookup, const lx_luxel_map *map, const uint8_t *answers);
 
 #endif

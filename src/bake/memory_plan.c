@@ -16,8 +16,7 @@ static const struct {
     uint32_t estimate;        // and layer: direct light; indirect light as well, where before it
     uint32_t radiosity;       // and layer, layers padded, was what passes added up to
     uint32_t met;             // and layer whose light gather rays meet: a part of its direct light
-    uint32_t row;             // and layer, layers padded: what two passes add, and light straight from sources
-    uint32_t pass_row;        // likewise, where bounces are counted: one more pass
+    uint32_t rows, pass_rows; // rows of the cache: what two passes add, and light straight from sources; and where bounces are counted one more pass
     // Per texel of the pages:
     uint32_t place;
     // Per tile and layer:
@@ -34,11 +33,11 @@ static const struct {
     .estimate = sizeof(lx_estimate),
     .radiosity = 3 * sizeof(float),
     .met = sizeof(lx_estimate),
-    .row = 3 * 3 * sizeof(uint16_t),
-    .pass_row = 3 * sizeof(uint16_t),
+    .rows = 3,
+    .pass_rows = 1,
     .place = 2 * sizeof(uint32_t),
     .tile = 4 * sizeof(double) + 1,
-    .batches = 4 << 20,
+    .batches = 8 << 20,
     .worker_row = 3 * lx_luxel_tile_edge * lx_luxel_tile_edge * 3 * sizeof(float),
     .worker_cell = lx_luxel_tile_edge * lx_luxel_tile_edge * (sizeof(lx_rgb) + sizeof(float)),
 };
@@ -90,7 +89,7 @@ static uint64_t group_bytes(const lx_bake_job *job, const lx_finish *finish, uin
     const uint64_t met = met_layer_count(bake) < layers ? met_layer_count(bake) : layers;
     uint64_t cache = lookup_bytes(bake) + workers * (cost.batches + cost.worker_row * padded + (uint64_t)cost.worker_cell * largest_cell_count(bake));
     cache += luxels * cost.met * met;
-    if (bounces) cache += luxels * (cost.luxel + cost.pass_ray * most_pass_rays + cost.extra + (cost.row + (truncated ? cost.pass_row : 0)) * padded);
+    if (bounces) cache += luxels * (cost.luxel + cost.pass_ray * most_pass_rays + cost.extra + (cost.rows + (truncated ? cost.pass_rows : 0)) * lx_row_stride((uint32_t)padded) * sizeof(uint16_t));
     const uint64_t finishing = lx_finish_worker_bytes(finish) * (layers < workers ? layers : workers); // the cache is gone by then
     return estimates + (cache > finishing ? cache : finishing);
 }

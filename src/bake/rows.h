@@ -11,12 +11,18 @@
 #include <stdint.h>
 #include <string.h>
 
-enum { lx_row_lanes = 8 };
+enum { lx_row_lanes = 8, lx_row_line = 32 }; // values
 
 /// Layers of a row, padded.
 static inline uint32_t lx_row_layers(uint32_t layer_count)
 {
     return (layer_count + lx_row_lanes - 1) / lx_row_lanes * lx_row_lanes;
+}
+
+/// Values from one row to the next: rows begin with a cache line each, since most are read one by one.
+static inline size_t lx_row_stride(uint32_t row_layers)
+{
+    return (3 * (size_t)row_layers + lx_row_line - 1) / lx_row_line * lx_row_line;
 }
 
 /// `value` times the layer's scale, 0 … 1.
@@ -40,6 +46,17 @@ static inline float lx_row_decode_small(uint16_t code)
 }
 
 #define LX_ROW_UNIT 0x1p64f ///< Times what the sums below add up: the value.
+
+/// Asks for a row that will be read soon. The second cache can wait for more lines at a time than the first.
+static inline void lx_row_fetch(const uint16_t *row, size_t count)
+{
+#if defined(__GNUC__)
+    for (size_t k = 0; k < count; k += lx_row_line) __builtin_prefetch(row + k, 0, 2);
+#else
+    (void)row;
+    (void)count;
+#endif
+}
 
 /// sums[i] += row[i], decoded small. `count` is a multiple of lx_row_lanes.
 void lx_row_add(float *sums, const uint16_t *row, size_t count);

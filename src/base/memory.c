@@ -46,7 +46,10 @@ void *lx_malloc_array(size_t count, size_t size)
 {
     size_t bytes;
     if (!lx_mul_size(count, size, &bytes)) return NULL;
-    return with_large_pages(malloc(bytes ? bytes : 1), bytes);
+    // Cache lines hold whole elements where their size divides a line.
+    const size_t line = 64;
+    if (bytes >= line && bytes <= SIZE_MAX - line) return with_large_pages(aligned_alloc(line, (bytes + line - 1) / line * line), bytes);
+    return malloc(bytes ? bytes : 1);
 }
 
 void *lx_calloc_array(size_t count, size_t size)

@@ -498,7 +498,7 @@ lx_vec3 lx_normal_at(const lx_tracer *tracer, uint32_t surface, uint32_t triangl
 
 bool lx_surface_is_plain(const lx_tracer *tracer, uint32_t surface)
 {
-    return tracer->surfaces[surface].kind == LX_SURFACE_OPAQUE && tracer->scene->surfaces[surface].source < 0;
+    return tracer->surfaces[surface].kind != LX_SURFACE_TRANSLUCENT && tracer->scene->surfaces[surface].source < 0;
 }
 
 bool lx_surface_is_double_sided(const lx_tracer *tracer, uint32_t surface)
@@ -564,19 +564,14 @@ static void shade_even_surfaces(lx_tracer *tracer)
     }
 }
 
+// What the material says of a hit.
 static void shade(const lx_tracer *tracer, const lx_hit *hit, lx_shading *s)
 {
     const lx_traced_surface *surface = &tracer->surfaces[hit->surface];
-    const float u = hit->u, v = hit->v;
-    const uint32_t *indices = surface->indices + 3 * (size_t)hit->triangle;
-    const lx_vec3 corner[3] = {surface->positions[indices[0]], surface->positions[indices[1]], surface->positions[indices[2]]};
-    s->position = lx_add(lx_add(lx_scale(corner[0], 1 - u - v), lx_scale(corner[1], u)), lx_scale(corner[2], v));
-    s->geometric_normal = geometric_normal(tracer, hit->surface, corner);
-    s->normal = interpolated_normal(surface, hit->triangle, u, v, s->geometric_normal);
     s->front = !hit->back;
     s->lit = s->front || surface->material->double_sided;
     if (!surface->even) {
-        shade_material(tracer, hit->surface, hit->triangle, u, v, s);
+        shade_material(tracer, hit->surface, hit->triangle, hit->u, hit->v, s);
         return;
     }
     s->opacity = surface->opacity;
@@ -628,6 +623,18 @@ void lx_shade_hits(const lx_tracer *tracer, const lx_ray *rays, const lx_hit *hi
     prefetch_first(tracer, hits, count);
     for (size_t i = 0; i < count; ++i) {
         prefetch_next(tracer, hits, i, count);
+        if (hits[i].surface == LX_MISS) continue;
+        lx_shading *s = &shading[i];
+        lx_hit_geometry(tracer, &hits[i], &s->position, &s->geometric_normal);
+        s->normal = interpolated_normal(&tracer->surfaces[hits[i].surface], hits[i].triangle, hits[i].u, hits[i].v, s->geometric_normal);
+        shade(tracer, &hits[i], s);
+    }
+}
+
+void lx_shade_materials(const lx_tracer *tracer, const lx_hit *hits, lx_shading *shading, size_t count)
+{
+    for (size_t i = 0; i < count; ++i) {
+        if (i + indices_ahead < count) prefetch_indices(tracer, &hits[i + indices_ahead]);
         if (hits[i].surface != LX_MISS) shade(tracer, &hits[i], &shading[i]);
     }
 }
@@ -641,5 +648,8 @@ void lx_hit_receivers(const lx_tracer *tracer, const lx_hit *hits, lx_receiver *
         prefetch_next(tracer, hits, i, count);
         lx_hit_geometry(tracer, hit, &r->position, &r->geometric_normal);
         r->normal = interpolated_normal(&tracer->surfaces[hit->surface], hit->triangle, hit->u, hit->v, r->geometric_normal);
+        if (!hit->back) continue;
+        r->normal = lx_neg(r->normal);
+        r->geometric_normal = lx_neg(r->geometric_normal);
     }
 }

@@ -85,8 +85,10 @@ typedef struct lx_patch {
 bool lx_trace_crowded(const lx_tracer *tracer, const lx_patch *patches, size_t count);
 /// Shades hits; misses are skipped. Thread-safe.
 void lx_shade_hits(const lx_tracer *tracer, const lx_ray *rays, const lx_hit *hits, lx_shading *shading, size_t count);
+/// The same, but positions and normals are left as they are.
+void lx_shade_materials(const lx_tracer *tracer, const lx_hit *hits, lx_shading *shading, size_t count);
 
-/// The front sides of many hits as places that receive light, without asking their materials.
+/// Many hits as places that receive light, on the sides that were hit, without asking their materials.
 void lx_hit_receivers(const lx_tracer *tracer, const lx_hit *hits, lx_receiver *receivers, size_t count);
 /// The bare geometry of a hit: what is there without asking its material. `normal` is the unit geometric normal of the front side.
 void lx_hit_geometry(const lx_tracer *tracer, const lx_hit *hit, lx_vec3 *position, lx_vec3 *normal);
