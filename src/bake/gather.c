@@ -222,7 +222,7 @@ static void find_authored(lx_gather_job *g)
     }
 }
 
-// Luxels that answer for what is hit on them: valid ones, unless they reach into two rooms.
+// Luxels that answer for what is hit on them: valid ones, unless they reach into two rooms or under something low.
 static lx_result choose_answers(lx_gather_job *g, lx_error *error)
 {
     const lx_bake_map *map = &g->job->map;

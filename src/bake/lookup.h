@@ -56,12 +56,13 @@ static inline lx_taps lx_lookup_taps(const lx_lookup *lookup, const lx_hit *hit,
     return (lx_taps){base + tap_y * lookup->page_size + tap_x, base + y0 * lookup->page_size + x0, s->first_chart + t->chart};
 }
 
-/// The luxel of the taps: within the chart and valid, else LX_NO_LUXEL.
+/// The luxel of the taps: within the chart and valid, else LX_NO_LUXEL. Where the texel that holds the hit says nothing, its neighbours say nothing of it either: they may
+/// lie on the other side of what it reaches under.
 static inline uint32_t lx_lookup_luxel(const lx_lookup *lookup, lx_taps taps)
 {
-    const lx_place tap = lookup->places[taps.tap];
+    const lx_place tap = lookup->places[taps.tap], holder = lookup->places[taps.holder];
+    if (holder.luxel == LX_NO_LUXEL) return LX_NO_LUXEL;
     if (tap.chart == taps.chart && tap.luxel != LX_NO_LUXEL) return tap.luxel;
-    const lx_place holder = lookup->places[taps.holder];
     return holder.chart == taps.chart ? holder.luxel : LX_NO_LUXEL;
 }
 
