@@ -60,7 +60,7 @@ static inline bool lx_luxel_is_valid(const lx_luxel_page *page, uint32_t texel)
     return page->state[texel] != LX_SITES_INVALID;
 }
 
-/// False where the texel reaches into more than one room, or half under something: what is hit there may be lit quite differently from the texel's sites.
+/// False where the texel reaches into more than one room, or under something low: what is hit there may be lit quite differently from the texel's sites.
 bool lx_luxel_is_whole(const lx_bake *bake, const lx_luxel_page *page, uint32_t texel);
 
 /// Key of a texel's random streams, from the seed, its page and its number there.

@@ -110,20 +110,22 @@ static bool all_look_free(const company *c)
     return true;
 }
 
-// Does something hang so low over some of the good sites, and not over others, that their mean says little of either?
-static bool is_half_covered(const company *c)
+// Does something hang so low over any of the good sites that little of what they send out is seen but from below it? It may be far brighter (a lamp under a ceiling lights
+// what it hides) or darker than what is beside it.
+static bool is_covered(const company *c)
 {
     lx_ray rays[lx_site_count];
     lx_rgb passes[lx_site_count];
-    uint32_t count = 0, covered = 0;
+    uint32_t count = 0;
     for (uint32_t k = 0; k < lx_site_count; ++k) {
         if (!(c->good >> k & 1)) continue;
         const lx_receiver *r = &c->sites[k];
         rays[count++] = (lx_ray){.origin = lx_offset_origin(r->position, r->geometric_normal), .direction = r->geometric_normal, .t_max = 0.5f * c->texel_m[k]};
     }
     lx_trace_transmittance(c->tracer, rays, passes, count);
-    for (uint32_t i = 0; i < count; ++i) covered += lx_rgb_is_black(passes[i]);
-    return covered > 0 && covered < count;
+    for (uint32_t i = 0; i < count; ++i)
+        if (lx_rgb_is_black(passes[i])) return true;
+    return false;
 }
 
 // ---- moving out -------------------------------------------------------------------------------------------------------------
@@ -335,7 +337,7 @@ static uint32_t choose_sites(company *c)
     if (all_look_free(c)) {
         c->good = (1u << lx_site_count) - 1;
         const uint32_t room = largest_room(c, &rooms);
-        c->split = rooms > 1 || is_half_covered(c);
+        c->split = rooms > 1 || is_covered(c);
         return room;
     }
     for (uint32_t k = 0; k < lx_site_count; ++k)
@@ -348,7 +350,7 @@ static uint32_t choose_sites(company *c)
         move_sites(c, lx_site_count);
         room = largest_room(c, &rooms);
     }
-    c->split = rooms > 1 || is_half_covered(c);
+    c->split = rooms > 1 || is_covered(c);
     return room;
 }
 

@@ -367,7 +367,8 @@ typedef struct near_query {
     bool crowded;
 } near_query;
 
-// Does the triangle rise over the patch, close to it, with a part of the patch behind it (a solid's), or on both of its sides?
+// Does the triangle rise over the patch, close to it, with a part of the patch behind it (a solid's), or if it has two fronts on both of its sides? Of such sheets those that
+// hang over the patch do as well: where they end nothing else tells, as the sides of a solid do.
 static bool crowds(const near_query *q, const lx_accel_mesh *mesh, unsigned triangle)
 {
     const lx_patch *patch = q->patch;
@@ -384,7 +385,8 @@ static bool crowds(const near_query *q, const lx_accel_mesh *mesh, unsigned tria
         low = lx_min(low, d);
         high = lx_max(high, d);
     }
-    if (!(low < -q->slack) || (mesh->front == 0 && !(high > q->slack))) return false;
+    const bool sheet = mesh->front == 0, hangs = sheet && fabsf(lx_dot(normal, patch->normal)) > 0.5f;
+    if (!hangs && (!(low < -q->slack) || (sheet && !(high > q->slack)))) return false;
     return lx_distance(closest_point(patch->centre, corner), patch->centre) <= q->radius;
 }
 
