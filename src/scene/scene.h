@@ -223,6 +223,9 @@ struct lx_scene {
 /// A slot without texture gives white. srgb: RGB decoded to linear before filtering, alpha untouched.
 lx_vec4 lx_texture_sample(const lx_scene *scene, const lx_texture_slot *slot, lx_vec2 uv, bool srgb);
 
+/// Its alpha alone.
+float lx_texture_sample_alpha(const lx_scene *scene, const lx_texture_slot *slot, lx_vec2 uv);
+
 /// True if a texel of the image has alpha below 1, i.e. the slot can let light through.
 bool lx_texture_has_alpha(const lx_scene *scene, const lx_texture_slot *slot);
 

@@ -83,18 +83,33 @@ static void split_light(const lx_tracer *tracer, uint32_t surface, const lx_mate
     *transmittance = lx_rgb_add(beside, lx_rgb_scale(tint, alpha * transmission));
 }
 
+// base_color_at's alpha alone.
+static float base_alpha_at(const lx_tracer *tracer, const lx_material *m, const surface_point *p)
+{
+    const lx_texture_slot *slot = &m->base_color_texture;
+    float alpha = m->base_alpha;
+    if (slot->texture >= 0) alpha *= lx_texture_sample_alpha(tracer->scene, slot, texcoord_at(p, slot));
+    if (p->primitive->colors) {
+        const lx_vec4 *colors = p->primitive->colors;
+        alpha *= p->w0 * colors[p->corner[0]].w + p->u * colors[p->corner[1]].w + p->v * colors[p->corner[2]].w;
+    }
+    return lx_clamp(alpha, 0, 1);
+}
+
+// Rays ask this of every cutout triangle they meet.
 static bool is_hole(void *user, uint32_t surface, uint32_t triangle, float u, float v)
 {
     const lx_tracer *tracer = user;
     const lx_material *m = material_of(tracer, surface);
     const surface_point p = point_of(tracer, surface, triangle, u, v);
-    return alpha_at(tracer, surface, m, base_color_at(tracer, m, &p).w) == 0;
+    return alpha_at(tracer, surface, m, base_alpha_at(tracer, m, &p)) == 0;
 }
 
 static lx_rgb transmittance_at(void *user, uint32_t surface, uint32_t triangle, float u, float v)
 {
     const lx_tracer *tracer = user;
     if (tracer->surfaces[surface].kind == LX_SURFACE_OPAQUE) return (lx_rgb){0, 0, 0};
+    if (tracer->surfaces[surface].kind == LX_SURFACE_CUTOUT) return lx_rgb_grey(is_hole(user, surface, triangle, u, v) ? 1 : 0);
     const lx_material *m = material_of(tracer, surface);
     const surface_point p = point_of(tracer, surface, triangle, u, v);
     float opacity;
