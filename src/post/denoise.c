@@ -20,6 +20,7 @@ enum {
     narrow_levels = level_count,                      // along one axis
     most_candidates = level_count + 2 * narrow_levels,
     pool_levels = 3,                                  // over which products of differences, and variances, are pooled
+    pilot_levels = 2,                                 // over which products of a pilot's are
     most_products = most_candidates * (most_candidates + 1) / 2 + 1, // and a weight
     block_luxels = 1024,  // mixed at a time
     region_luxels = 3072, // what a block's pools reach; one luxel's reach 729
@@ -34,6 +35,7 @@ static const float contrast = 6, own_share = 0.25f;
 static const float unsure = 0.05f; // relative variance at which a luxel's own value and its neighbourhood's count alike
 // Differences between neighbours tell of noise up to so many times what variances expect, and lower these to a tenth at most.
 static const float most_difference = 4, least_calm = 0.1f;
+static const float pilot_trust = 0.8f; // there is noise left in it that passes for light
 // Covariances come from some tens of luxels: their diagonals are raised by a share, and by that of the noise; less so where a pilot tells of the light.
 static const float ridges[] = {0.2f, 0.05f}, ridges_of_noise[] = {0.01f, 0.003f};
 
@@ -56,6 +58,7 @@ typedef struct work {
     bool may_sharpen;            // weights below zero: kernels that keep curvature
     lx_rgb *candidates[most_candidates]; // [luxel]
     float *variances;            // [luxel]
+    int mix_levels;              // over which products of differences are pooled
     bool has_pilot;
     float *pilot;                // [luxel] mean of the channels
     float *filtered[most_candidates];     // [luxel] the pilot as the candidates are the input
@@ -78,7 +81,7 @@ size_t lx_denoise_scratch_bytes(const lx_denoise_graph *graph)
 
 static work lay_out(const lx_denoise_graph *graph, lx_light_part part, void *scratch)
 {
-    work w = {.graph = graph, .candidate_count = part == lx_light_direct ? most_candidates : level_count, .may_sharpen = part == lx_light_indirect};
+    work w = {.graph = graph, .candidate_count = part == lx_light_direct ? most_candidates : level_count, .may_sharpen = part == lx_light_indirect, .mix_levels = pool_levels};
     const size_t count = graph->luxel_count;
     w.region = scratch;
     lx_rgb *next = (lx_rgb *)(void *)(w.region + 1);
@@ -326,8 +329,8 @@ static uint32_t collect(const work *w, uint32_t first, uint32_t end, bool *fits)
         r->list[count++] = i;
     }
     r->end[0] = count;
-    for (int k = 1; k <= pool_levels && *fits; ++k) {
-        *fits = widen(w, pool_levels - k, &count);
+    for (int k = 1; k <= w->mix_levels && *fits; ++k) {
+        *fits = widen(w, w->mix_levels - k, &count);
         r->end[k] = count;
     }
     if (*fits) return count;
@@ -381,7 +384,7 @@ static void solve(float a[most_candidates][most_candidates], uint32_t count, flo
 static void find_weights(const work *w, const float *products, const float *own, float *x)
 {
     const uint32_t count = w->candidate_count;
-    const float scale = 1 / products[count * (count + 1) / 2];
+    const float trust = (w->has_pilot ? pilot_trust : 1) / products[count * (count + 1) / 2];
     uint32_t used[most_candidates], used_count = 0;
     for (uint32_t k = 0; k < count; ++k) {
         x[k] = 0;
@@ -393,7 +396,7 @@ static void find_weights(const work *w, const float *products, const float *own,
             const uint32_t k = used[i];
             y[i] = 1 - own[k];
             whole[i] = w->has_pilot ? sqrtf(y[i] / (1 - w->own[k])) : 0;
-            for (uint32_t j = 0; j <= i; ++j) a[i][j] = products[k * (k + 1) / 2 + used[j]] * scale + whole[i] * whole[j] * w->covariance[k][used[j]];
+            for (uint32_t j = 0; j <= i; ++j) a[i][j] = products[k * (k + 1) / 2 + used[j]] * trust + whole[i] * whole[j] * w->covariance[k][used[j]];
             a[i][i] = a[i][i] * (1 + ridges[w->has_pilot]) + ridges_of_noise[w->has_pilot];
         }
         solve(a, used_count, y);
@@ -447,8 +450,8 @@ static void mix_block(const work *w, const lx_estimate *in, uint32_t first, uint
     const size_t size = (size_t)w->candidate_count * (w->candidate_count + 1) / 2 + 1;
     float *from = r->products[0], *to = r->products[1];
     for (uint32_t i = 0; i < count; ++i) multiply(w, in, r->list[i], size, from + size * i);
-    for (int level = 0; level < pool_levels; ++level) {
-        pool(w->graph, level, r->list, r->end[pool_levels - 1 - level], r->slot, size, from, to);
+    for (int level = 0; level < w->mix_levels; ++level) {
+        pool(w->graph, level, r->list, r->end[w->mix_levels - 1 - level], r->slot, size, from, to);
         float *swap = from;
         from = to;
         to = swap;
@@ -483,5 +486,6 @@ void lx_denoise_layer(const lx_denoise_graph *graph, lx_light_part part, const l
     find_covariances(&w);
     mix_all(&w, in, out);
     filter_pilot(&w, out);
+    if (part == lx_light_direct) w.mix_levels = pilot_levels; // its detail is finer, and a pilot tells enough of fewer luxels
     mix_all(&w, in, out);
 }
