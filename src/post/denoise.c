@@ -6,6 +6,8 @@
 // 3. For each luxel the mixture of the input and the candidates that has the least squared error around it. What a candidate differs from the
 //    input, squared, is known; how much of that difference is the input's noise is the variance times the weight that the luxel itself
 //    does not have in the candidate. That is all it takes: linear equations, as many as candidates.
+// 4. The same once more, with what came out as a pilot ([Dabov2007], "Image Denoising by Sparse 3-D Transform-Domain Collaborative Filtering", does so): what candidates do to
+//    the light is seen in the pilot, and what they do to the noise is known from their kernels, so that the equations are hardly noisy any more.
 #include "post/denoise_graph.h"
 
 #include "base/memory.h"
@@ -15,9 +17,10 @@
 enum {
     direction_count = lx_denoise_direction_count,
     level_count = lx_denoise_level_count,
-    narrow_levels = 3,                                // along one axis
+    narrow_levels = level_count,                      // along one axis
     most_candidates = level_count + 2 * narrow_levels,
     pool_levels = 3,                                  // over which products of differences, and variances, are pooled
+    pilot_levels = 2,                                 // over which products of a pilot's are
     most_products = most_candidates * (most_candidates + 1) / 2 + 1, // and a weight
     block_luxels = 1024,  // mixed at a time
     region_luxels = 3072, // what a block's pools reach; one luxel's reach 729
@@ -26,16 +29,15 @@ enum {
 enum { every_axis = -1 }; // else 0 or 2: the direction along it
 
 // A neighbour without one on the other side would tilt a slope: so much of its weight counts.
-static const float unpaired_share = 0.2f;
+static const float unpaired_share = 0.5f;
 // By how much the variance beside a bright spot may exceed what the value suggests; and the share of a luxel's own variance that counts at least.
 static const float contrast = 6, own_share = 0.25f;
 static const float unsure = 0.05f; // relative variance at which a luxel's own value and its neighbourhood's count alike
-// Direct light beside a penumbra has no noise: not even a luxel's few samples would hide so much of theirs.
-static const float most_hidden = 8;
 // Differences between neighbours tell of noise up to so many times what variances expect, and lower these to a tenth at most.
 static const float most_difference = 4, least_calm = 0.1f;
-// Covariances come from some tens of luxels: their diagonals are raised by a share, and by that of the noise.
-static const float ridge = 0.2f, ridge_of_noise = 0.01f;
+static const float pilot_trust = 0.8f; // there is noise left in it that passes for light
+// Covariances come from some tens of luxels: their diagonals are raised by a share, and by that of the noise; less so where a pilot tells of the light.
+static const float ridges[] = {0.2f, 0.05f}, ridges_of_noise[] = {0.01f, 0.003f};
 
 // The kernel [1 2 1; 2 4 2; 1 2 1] / 16 in the links' order, over 15 for their weights.
 static const float kernel_center = 0.25f;
@@ -56,6 +58,12 @@ typedef struct work {
     bool may_sharpen;            // weights below zero: kernels that keep curvature
     lx_rgb *candidates[most_candidates]; // [luxel]
     float *variances;            // [luxel]
+    int mix_levels;              // over which products of differences are pooled
+    bool has_pilot;
+    float *pilot;                // [luxel] mean of the channels
+    float *filtered[most_candidates];     // [luxel] the pilot as the candidates are the input
+    // Of unit noise, where no neighbour is missing: what a candidate has of a luxel's own, and covariances of what candidates differ from the input by.
+    float own[most_candidates], covariance[most_candidates][most_candidates];
     region *region;
 } work;
 
@@ -68,18 +76,20 @@ static const uint32_t *links_at(const lx_denoise_graph *graph, int level)
 
 size_t lx_denoise_scratch_bytes(const lx_denoise_graph *graph)
 {
-    return sizeof(region) + (size_t)graph->luxel_count * (most_candidates * sizeof(lx_rgb) + sizeof(float) + sizeof(uint32_t));
+    return sizeof(region) + (size_t)graph->luxel_count * (most_candidates * (sizeof(lx_rgb) + sizeof(float)) + 2 * sizeof(float) + sizeof(uint32_t));
 }
 
 static work lay_out(const lx_denoise_graph *graph, lx_light_part part, void *scratch)
 {
-    work w = {.graph = graph, .candidate_count = part == lx_light_direct ? most_candidates : level_count, .may_sharpen = part == lx_light_indirect};
+    work w = {.graph = graph, .candidate_count = part == lx_light_direct ? most_candidates : level_count, .may_sharpen = part == lx_light_indirect, .mix_levels = pool_levels};
     const size_t count = graph->luxel_count;
     w.region = scratch;
     lx_rgb *next = (lx_rgb *)(void *)(w.region + 1);
     for (int k = 0; k < most_candidates; ++k, next += count) w.candidates[k] = next;
     w.variances = (float *)(void *)next;
-    w.region->slot = (uint32_t *)(void *)(w.variances + count);
+    w.pilot = w.variances + count;
+    for (int k = 0; k < most_candidates; ++k) w.filtered[k] = w.pilot + (size_t)(k + 1) * count;
+    w.region->slot = (uint32_t *)(void *)(w.pilot + (size_t)(most_candidates + 1) * count);
     memset(w.region->slot, 0xff, count * sizeof *w.region->slot);
     return w;
 }
@@ -117,7 +127,7 @@ typedef struct spread {
     float absolute, relative, value;
 } spread;
 
-static void pool_variances(const work *w, lx_light_part part, const lx_estimate *in)
+static void pool_variances(const work *w, const lx_estimate *in)
 {
     const uint32_t count = w->graph->luxel_count;
     spread *a = (spread *)(void *)w->candidates[0], *b = (spread *)(void *)w->candidates[1];
@@ -137,7 +147,6 @@ static void pool_variances(const work *w, lx_light_part part, const lx_estimate 
         const float value = (1 - shared) * mean_of(in[i].mean) + shared * a[i].value;
         const float smooth = lx_min(a[i].absolute, contrast * a[i].relative * value * value);
         float variance = lx_max(smooth, own_share * in[i].variance); // an outlier knows that it is one
-        if (part == lx_light_direct) variance = lx_min(variance, most_hidden * in[i].variance);
         // What is below rounding is nothing.
         w->variances[i] = variance > lx_max(1e-12f * value * value, 1e-30f) ? variance : 0;
     }
@@ -166,34 +175,89 @@ static float neighbour_weights(const uint32_t *link, int axis, float *weights)
     return total;
 }
 
-// One level of the wavelet, [Dammertz2010] without its edges.
-static void filter_level(const lx_denoise_graph *graph, int level, int axis, const lx_rgb *in, lx_rgb *out)
+// One level of the wavelet, [Dammertz2010] without its edges, of `size` numbers a luxel.
+static inline __attribute__((always_inline)) void filter_level(const lx_denoise_graph *graph, int level, int axis, size_t size, const float *restrict in,
+                                                               float *restrict out)
 {
     const uint32_t *link = links_at(graph, level);
     for (uint32_t i = 0; i < graph->luxel_count; ++i, link += direction_count) {
-        float weights[direction_count];
-        const float total = neighbour_weights(link, axis, weights);
-        lx_rgb sum = lx_rgb_scale(in[i], kernel_center);
+        float weights[direction_count], sum[3];
+        const float scale = 1 / neighbour_weights(link, axis, weights);
+        for (size_t k = 0; k < size; ++k) sum[k] = kernel_center * in[size * i + k];
         for (int d = 0; d < direction_count; ++d) {
             if (weights[d] == 0) continue;
-            sum = lx_rgb_add(sum, lx_rgb_scale(in[link[d] >> lx_denoise_weight_bits], weights[d]));
+            const float *other = in + size * (link[d] >> lx_denoise_weight_bits);
+            for (size_t k = 0; k < size; ++k) sum[k] += weights[d] * other[k];
         }
-        out[i] = lx_rgb_scale(sum, 1 / total);
+        for (size_t k = 0; k < size; ++k) out[size * i + k] = scale * sum[k];
+    }
+}
+
+// A candidate is filtered up to `level` along an axis, or both; from the input if `before` is -1, else from that candidate.
+typedef struct shape {
+    int axis, level, before;
+} shape;
+
+static shape shape_of(int candidate)
+{
+    if (candidate < level_count) return (shape){every_axis, candidate, candidate - 1};
+    const int level = (candidate - level_count) % narrow_levels;
+    return (shape){candidate < level_count + narrow_levels ? 0 : 2, level, level == 0 ? -1 : candidate - 1};
+}
+
+static void filter_input(const work *w, const lx_rgb *input)
+{
+    for (int k = 0; k < (int)w->candidate_count; ++k) {
+        const shape s = shape_of(k);
+        filter_level(w->graph, s.level, s.axis, 3, s.before < 0 ? &input->r : &w->candidates[s.before]->r, &w->candidates[k]->r);
+    }
+}
+
+static void filter_pilot(work *w, const lx_rgb *pilot)
+{
+    for (uint32_t i = 0; i < w->graph->luxel_count; ++i) w->pilot[i] = mean_of(pilot[i]);
+    for (int k = 0; k < (int)w->candidate_count; ++k) {
+        const shape s = shape_of(k);
+        filter_level(w->graph, s.level, s.axis, 1, s.before < 0 ? w->pilot : w->filtered[s.before], w->filtered[k]);
+    }
+    w->has_pilot = true;
+}
+
+// Kernels are products of one along each axis, of [1 2 1] / 4 at the steps of all levels up to theirs.
+static void find_covariances(work *w)
+{
+    enum { middle = (1 << level_count) - 1, width = 2 * middle + 1 };
+    float line[level_count + 1][width] = {{0}}, inner[level_count + 1][level_count + 1]; // [levels]
+    line[0][middle] = 1;
+    for (int n = 0; n < level_count; ++n)
+        for (int i = 0; i < width; ++i) {
+            const int step = 1 << n;
+            line[n + 1][i] = 0.5f * line[n][i] + 0.25f * ((i >= step ? line[n][i - step] : 0) + (i + step < width ? line[n][i + step] : 0));
+        }
+    for (int a = 0; a <= level_count; ++a)
+        for (int b = 0; b <= level_count; ++b) {
+            inner[a][b] = 0;
+            for (int i = 0; i < width; ++i) inner[a][b] += line[a][i] * line[b][i];
+        }
+    int across[most_candidates], down[most_candidates];
+    for (int k = 0; k < most_candidates; ++k) {
+        const shape s = shape_of(k);
+        across[k] = s.axis == 2 ? 0 : s.level + 1;
+        down[k] = s.axis == 0 ? 0 : s.level + 1;
+        w->own[k] = line[across[k]][middle] * line[down[k]][middle];
+        for (int j = 0; j <= k; ++j)
+            w->covariance[k][j] = inner[across[k]][across[j]] * inner[down[k]][down[j]] - w->own[k] - w->own[j] + 1;
     }
 }
 
 // Weight that a luxel has itself in each candidate: no way leads back to it, since the steps of each level are longer than those before together.
 static void find_own_weights(const work *w, uint32_t luxel, float *own)
 {
-    static const int axes[] = {every_axis, 0, 2};
-    uint32_t k = 0;
-    for (int a = 0; a < 3 && k < w->candidate_count; ++a) {
-        float product = 1;
-        for (int level = 0; level < (a == 0 ? level_count : narrow_levels); ++level) {
-            float weights[direction_count];
-            product *= kernel_center / neighbour_weights(links_at(w->graph, level) + (size_t)luxel * direction_count, axes[a], weights);
-            own[k++] = product;
-        }
+    for (int k = 0; k < (int)w->candidate_count; ++k) {
+        const shape s = shape_of(k);
+        float weights[direction_count];
+        own[k] = kernel_center / neighbour_weights(links_at(w->graph, s.level) + (size_t)luxel * direction_count, s.axis, weights);
+        if (s.before >= 0) own[k] *= own[s.before];
     }
 }
 
@@ -205,7 +269,7 @@ static void calm_variances(const work *w, const lx_rgb *input)
         float share, weight;
     } calm;
     const uint32_t count = w->graph->luxel_count;
-    calm *a = (calm *)(void *)w->candidates[1], *b = (calm *)(void *)w->candidates[2];
+    calm *a = (calm *)(void *)w->filtered[0], *b = (calm *)(void *)w->filtered[2]; // two numbers: two arrays' place
     const uint32_t *link = links_at(w->graph, 0);
     for (uint32_t i = 0; i < count; ++i, link += direction_count) {
         a[i] = (calm){0, 0};
@@ -265,8 +329,8 @@ static uint32_t collect(const work *w, uint32_t first, uint32_t end, bool *fits)
         r->list[count++] = i;
     }
     r->end[0] = count;
-    for (int k = 1; k <= pool_levels && *fits; ++k) {
-        *fits = widen(w, pool_levels - k, &count);
+    for (int k = 1; k <= w->mix_levels && *fits; ++k) {
+        *fits = widen(w, w->mix_levels - k, &count);
         r->end[k] = count;
     }
     if (*fits) return count;
@@ -274,7 +338,8 @@ static uint32_t collect(const work *w, uint32_t first, uint32_t end, bool *fits)
     return 0;
 }
 
-// Products of the candidates' differences from the input, in units of the input's variance, and the weight that they have: none where nothing is noise.
+// Products of the candidates' differences from the input, or of their likes from the pilot, in units of the input's variance, and the weight that they have: none where
+// nothing is noise.
 static void multiply(const work *w, const lx_estimate *in, uint32_t luxel, size_t size, float *out)
 {
     const float variance = w->variances[luxel];
@@ -286,7 +351,7 @@ static void multiply(const work *w, const lx_estimate *in, uint32_t luxel, size_
     float difference[most_candidates];
     size_t at = 0;
     for (uint32_t k = 0; k < w->candidate_count; ++k) {
-        difference[k] = mean_of(w->candidates[k][luxel]) - value;
+        difference[k] = w->has_pilot ? w->filtered[k][luxel] - w->pilot[luxel] : mean_of(w->candidates[k][luxel]) - value;
         for (uint32_t j = 0; j <= k; ++j) out[at++] = difference[k] * difference[j] * scale;
     }
     out[at] = 1;
@@ -319,19 +384,20 @@ static void solve(float a[most_candidates][most_candidates], uint32_t count, flo
 static void find_weights(const work *w, const float *products, const float *own, float *x)
 {
     const uint32_t count = w->candidate_count;
-    const float scale = 1 / products[count * (count + 1) / 2];
+    const float trust = (w->has_pilot ? pilot_trust : 1) / products[count * (count + 1) / 2];
     uint32_t used[most_candidates], used_count = 0;
     for (uint32_t k = 0; k < count; ++k) {
         x[k] = 0;
         if (own[k] < 1) used[used_count++] = k;
     }
     while (used_count > 0) {
-        float a[most_candidates][most_candidates], y[most_candidates];
+        float a[most_candidates][most_candidates], y[most_candidates], whole[most_candidates]; // how much of a kernel's noise is left where neighbours are missing
         for (uint32_t i = 0; i < used_count; ++i) {
             const uint32_t k = used[i];
-            for (uint32_t j = 0; j <= i; ++j) a[i][j] = products[k * (k + 1) / 2 + used[j]] * scale;
-            a[i][i] = a[i][i] * (1 + ridge) + ridge_of_noise;
             y[i] = 1 - own[k];
+            whole[i] = w->has_pilot ? sqrtf(y[i] / (1 - w->own[k])) : 0;
+            for (uint32_t j = 0; j <= i; ++j) a[i][j] = products[k * (k + 1) / 2 + used[j]] * trust + whole[i] * whole[j] * w->covariance[k][used[j]];
+            a[i][i] = a[i][i] * (1 + ridges[w->has_pilot]) + ridges_of_noise[w->has_pilot];
         }
         solve(a, used_count, y);
         uint32_t kept = 0;
@@ -384,8 +450,8 @@ static void mix_block(const work *w, const lx_estimate *in, uint32_t first, uint
     const size_t size = (size_t)w->candidate_count * (w->candidate_count + 1) / 2 + 1;
     float *from = r->products[0], *to = r->products[1];
     for (uint32_t i = 0; i < count; ++i) multiply(w, in, r->list[i], size, from + size * i);
-    for (int level = 0; level < pool_levels; ++level) {
-        pool(w->graph, level, r->list, r->end[pool_levels - 1 - level], r->slot, size, from, to);
+    for (int level = 0; level < w->mix_levels; ++level) {
+        pool(w->graph, level, r->list, r->end[w->mix_levels - 1 - level], r->slot, size, from, to);
         float *swap = from;
         from = to;
         to = swap;
@@ -399,6 +465,12 @@ static void mix_block(const work *w, const lx_estimate *in, uint32_t first, uint
     forget(r, count);
 }
 
+static void mix_all(const work *w, const lx_estimate *in, lx_rgb *out)
+{
+    const uint32_t count = w->graph->luxel_count;
+    for (uint32_t first = 0; first < count; first += block_luxels) mix_block(w, in, first, count - first < block_luxels ? count : first + block_luxels, out);
+}
+
 void lx_denoise_layer(const lx_denoise_graph *graph, lx_light_part part, const lx_estimate *in, void *scratch, lx_rgb *out)
 {
     bool is_exact = true;
@@ -408,14 +480,12 @@ void lx_denoise_layer(const lx_denoise_graph *graph, lx_light_part part, const l
     }
     if (is_exact) return;
     work w = lay_out(graph, part, scratch);
-    pool_variances(&w, part, in);
-    filter_level(graph, 0, every_axis, out, w.candidates[0]);
+    pool_variances(&w, in);
+    filter_input(&w, out);
     calm_variances(&w, out);
-    for (int level = 1; level < level_count; ++level) filter_level(graph, level, every_axis, w.candidates[level - 1], w.candidates[level]);
-    for (uint32_t k = level_count; k < w.candidate_count; ++k) {
-        const int level = (int)(k - level_count) % narrow_levels, axis = k < level_count + narrow_levels ? 0 : 2;
-        filter_level(graph, level, axis, level == 0 ? out : w.candidates[k - 1], w.candidates[k]);
-    }
-    for (uint32_t first = 0; first < graph->luxel_count; first += block_luxels)
-        mix_block(&w, in, first, graph->luxel_count - first < block_luxels ? graph->luxel_count : first + block_luxels, out);
+    find_covariances(&w);
+    mix_all(&w, in, out);
+    filter_pilot(&w, out);
+    if (part == lx_light_direct) w.mix_levels = pilot_levels; // its detail is finer, and a pilot tells enough of fewer luxels
+    mix_all(&w, in, out);
 }

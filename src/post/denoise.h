@@ -42,8 +42,8 @@ size_t lx_denoise_graph_bytes(uint32_t luxel_count);
 size_t lx_denoise_graph_build_bytes(uint32_t luxel_count);
 size_t lx_denoise_scratch_bytes(const lx_denoise_graph *graph);
 
-/// What light is denoised. Direct light has shadow edges: it is also filtered along each axis of the grid alone, and a luxel without noise has none
-/// beside a penumbra. Indirect light is smooth: mixtures may have weights below zero, which keeps its curvature.
+/// What light is denoised. Direct light has shadow edges: it is also filtered along each axis of the grid alone. Indirect light is smooth: mixtures may
+/// have weights below zero, which keeps its curvature.
 typedef enum lx_light_part { lx_light_direct, lx_light_indirect } lx_light_part;
 
 /// Denoises one layer: `in` [luxel] → `out` [luxel], means alone. `scratch`: lx_denoise_scratch_bytes, 16-byte aligned, content irrelevant before

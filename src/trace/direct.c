@@ -93,7 +93,7 @@ typedef struct job {
     uint32_t source, key, cells, weight;
     uint32_t samples; // of a luxel, at most (of a uniform sky, times its weight there)
     uint32_t first_samples; // of which so many come first, then four times as many, and so on
-    bool is_uniform_sky;
+    bool is_sharp, is_uniform_sky;
     bool has_views;
     uint32_t viewed; // luxel that the view is of; most_luxels: none yet
     spread even, shadowed; // of luxels whose shadows are known, and of others
@@ -217,9 +217,23 @@ static uint32_t weight_at(const job *j, uint32_t luxel)
     return j->is_uniform_sky && j->tile->sky_weight ? j->tile->sky_weight[luxel] : j->weight;
 }
 
+// Beside a small lamp light is so bright, and changes so much over a luxel, that a few such luxels hold most of a picture's error: they take more samples.
+static uint32_t nearness(const job *j, uint32_t luxel)
+{
+    const lx_source_sphere *lamp = &j->tracer->source_spheres[j->source];
+    if (j->is_sharp || j->cells > 1 || !(lamp->power < INFINITY)) return 1;
+    const lx_receiver *sites = &j->tile->sites[(size_t)luxel * lx_direct_sites];
+    float width = 0, distance = INFINITY;
+    for (int k = 0; k < lx_direct_sites; ++k) {
+        width = lx_max(width, lx_distance(sites[k].position, sites[0].position));
+        distance = lx_min(distance, lx_distance(sites[k].position, lamp->centre));
+    }
+    return distance < width ? runs * runs : distance < 2 * width ? runs : 1;
+}
+
 static uint32_t most_samples(const job *j, uint32_t luxel)
 {
-    return j->samples / j->weight * weight_at(j, luxel);
+    return j->samples / j->weight * weight_at(j, luxel) * nearness(j, luxel);
 }
 
 // The first samples ask the source itself, further ones a view of it: most luxels that it reaches take enough of them for that.
@@ -563,7 +577,8 @@ bool lx_direct_light(lx_direct_batch *b, const lx_direct_settings *settings, con
     // Random numbers as the path integrator takes them for the light samples at the start of a path: vertex 0.
     job j = {.b = b, .tracer = tracer, .tile = tile, .source = source, .key = lx_hash_combine(tracer->source_keys[source], 0),
              .cells = lx_tracer_cell_count(tracer, source), .weight = lx_direct_sample_weight(tracer, source)};
-    j.samples = is_sharp(tracer, source) ? (uint32_t)lx_direct_sites : settings->samples * j.weight;
+    j.is_sharp = is_sharp(tracer, source);
+    j.samples = j.is_sharp ? (uint32_t)lx_direct_sites : settings->samples * j.weight;
     j.first_samples = j.samples;
     j.has_views = lx_source_has_views(tracer, source);
     j.is_uniform_sky = is_uniform_sky(tracer, source);
@@ -597,7 +612,8 @@ bool lx_direct_light(lx_direct_batch *b, const lx_direct_settings *settings, con
     }
     for (uint32_t first = 0; first < count; first += chunk)
         sum_shadowed(&j, b->list + first, count - first < chunk ? count - first : chunk, mean, variance);
-    const float gains[2] = {gain_of(&j.shadowed), gain_of(&j.even)};
+    // What sites of a sharp source disagree by is the shadow's outline, no noise: other random numbers would give the same.
+    const float gains[2] = {j.is_sharp ? 0 : gain_of(&j.shadowed), j.is_sharp ? 0 : gain_of(&j.even)};
     for (uint32_t i = 0; i < tile->count; ++i) {
         const luxel_state *s = &b->luxels[i];
         const float gain = gains[s->verdict == sees_same && !s->doubtful];
