@@ -2,7 +2,7 @@
 //
 // A source's triangles are chosen by a light tree, or if they are few by their power. A textured triangle is cut by a regular grid of its barycentrics, fine enough that a
 // piece covers some two texels across; each piece is chosen by its mean brightness, but never by less than a small share of the
-// triangle's, because the estimate of a piece may miss what lies between its lookups.
+// triangle's, because the estimate of a piece may miss what lies between its lookups. A plain triangle is sampled by solid angle where it is near, else by area.
 #include "trace/emitters.h"
 
 #include "base/error.h"
@@ -297,12 +297,52 @@ static const lx_emitter_triangle *choose_triangle(const lx_emitters *emitters, u
     return t->probability > 0 ? t : NULL;
 }
 
+// A plain triangle so near the viewer that cosine and distance differ a lot over it is sampled by solid angle. False: by area.
+static bool see_triangle(const lx_emitter_triangle *t, lx_vec3 viewer, lx_spherical_triangle *out)
+{
+    static const float near_areas = 16; // square of the distance over the area
+    static const float least_angle = 1e-3f, most_angle = 6.2f; // whose directions and areas can be told
+    if (t->grid != 1) return false;
+    const lx_vec3 a = lx_sub(t->origin, viewer), corner[3] = {a, lx_add(a, t->edge1), lx_add(a, t->edge2)};
+    const lx_vec3 centre = lx_mad(a, lx_add(t->edge1, t->edge2), 1.0f / 3);
+    if (!(lx_dot(centre, centre) < near_areas * t->area)) return false;
+    *out = lx_spherical_triangle_of(corner);
+    return out->solid_angle > least_angle && out->solid_angle < most_angle;
+}
+
+// Barycentrics of the point of the triangle's plane in a direction, kept within the triangle ([PBR4] 6.5.4).
+static lx_vec2 meet_triangle(const lx_emitter_triangle *t, lx_vec3 viewer, lx_vec3 direction)
+{
+    const lx_vec3 s1 = lx_cross(direction, t->edge2), s = lx_sub(viewer, t->origin);
+    const float divisor = lx_dot(s1, t->edge1);
+    if (divisor == 0) return (lx_vec2){1.0f / 3, 1.0f / 3};
+    const float u = lx_clamp(lx_dot(s, s1) / divisor, 0, 1), v = lx_clamp(lx_dot(direction, lx_cross(s, t->edge1)) / divisor, 0, 1);
+    const float sum = lx_max(1, u + v);
+    return (lx_vec2){u / sum, v / sum};
+}
+
+// Solid angle per m² at a point of the triangle.
+static float angle_per_area(const lx_emitter_triangle *t, lx_vec3 viewer, float u, float v)
+{
+    const lx_vec3 to_point = lx_sub(lx_mad(lx_mad(t->origin, t->edge1, u), t->edge2, v), viewer);
+    const float distance2 = lx_dot(to_point, to_point);
+    return distance2 > 0 ? fabsf(lx_dot(t->normal, to_point)) / (distance2 * sqrtf(distance2)) : 0;
+}
+
 bool lx_emitters_sample(const lx_emitters *emitters, uint32_t source, const lx_light_table *table, lx_vec3 viewer, lx_vec2 u, lx_emitter_sample *out)
 {
     float probability;
     const lx_emitter_triangle *t = choose_triangle(emitters, source, table, viewer, &u.x, &probability);
     if (!t) return false;
     *out = (lx_emitter_sample){.triangle = t, .pdf_area = probability / t->area};
+    lx_spherical_triangle seen;
+    if (see_triangle(t, viewer, &seen)) {
+        const lx_vec2 b = meet_triangle(t, viewer, lx_sample_spherical_triangle(&seen, u));
+        out->u = b.x;
+        out->v = b.y;
+        out->pdf_area = probability * angle_per_area(t, viewer, b.x, b.y) / seen.solid_angle;
+        return out->pdf_area > 0;
+    }
     if (t->grid == 1) {
         const lx_vec2 b = lx_sample_triangle(u);
         out->u = b.x;
@@ -329,6 +369,8 @@ float lx_emitters_pdf_area(const lx_emitters *emitters, uint32_t source, uint32_
     const bool by_tree = lx_emitters_has_tree(emitters, source);
     const float probability = by_tree ? lx_light_tree_probability(&emitters->tree, index, viewer) : t->probability;
     const float uniform = probability / t->area;
+    lx_spherical_triangle seen;
+    if (see_triangle(t, viewer, &seen)) return probability * angle_per_area(t, viewer, u, v) / seen.solid_angle;
     if (t->grid == 1) return uniform;
     const uint32_t n = t->grid;
     const float x = lx_clamp(u, 0, 1) * (float)n, y = lx_clamp(v, 0, 1) * (float)n;

@@ -1,7 +1,9 @@
 /// Directions and points by density. Every function states its pdf and measure.
 ///
 /// Based on: [PBR4] Pharr, Jakob, Humphreys, "Physically Based Rendering", 4th ed., appendix A.5;
-/// [Urena2013] Ureña, Fajardo, King, "An Area-Preserving Parametrization for Spherical Rectangles", EGSR 2013.
+/// [Urena2013] Ureña, Fajardo, King, "An Area-Preserving Parametrization for Spherical Rectangles", EGSR 2013;
+/// [Arvo1995] Arvo, "Stratified Sampling of Spherical Triangles", SIGGRAPH 1995;
+/// [VanOosterom1983] van Oosterom, Strackee, "The Solid Angle of a Plane Triangle", IEEE Trans. Biomed. Eng. 30(2).
 #ifndef LX_TRACE_SAMPLING_H
 #define LX_TRACE_SAMPLING_H
 
@@ -69,5 +71,18 @@ lx_spherical_rectangle lx_spherical_rectangle_of(lx_vec3 corner, float width, fl
 
 /// Point on the rectangle, same frame, relative to the viewer, z towards the viewer's negative side. pdf_solid_angle = 1 / solid_angle.
 lx_vec3 lx_sample_spherical_rectangle(const lx_spherical_rectangle *r, lx_vec2 u);
+
+/// A triangle as seen from a point: what [Arvo1995] needs to sample it by solid angle.
+typedef struct lx_spherical_triangle {
+    float solid_angle; ///< 0: too thin or too near to tell.
+    double a[3], b[3], c[3]; ///< Unit directions of the corners.
+    double cos_alpha, sin_alpha; ///< Of the angle at a.
+} lx_spherical_triangle;
+
+/// `corner`: relative to the viewer.
+lx_spherical_triangle lx_spherical_triangle_of(const lx_vec3 corner[3]);
+
+/// Unit direction within the triangle; solid_angle > 0. pdf_solid_angle = 1 / solid_angle.
+lx_vec3 lx_sample_spherical_triangle(const lx_spherical_triangle *t, lx_vec2 u);
 
 #endif

@@ -118,6 +118,47 @@ static void spherical_rectangle_knows_its_solid_angle_and_samples_it_evenly(void
     }
 }
 
+// Between the planes through `at` and either of the others.
+static double angle_at(lx_vec3 at, lx_vec3 b, lx_vec3 c)
+{
+    const lx_vec3 n = lx_normalize_or(lx_cross(at, b), (lx_vec3){0, 0, 0}), m = lx_normalize_or(lx_cross(at, c), (lx_vec3){0, 0, 0});
+    return acos(fmin(fmax((double)lx_dot(n, m), -1), 1));
+}
+
+// Girard: the sum of the angles less pi.
+static double solid_angle_by_angles(lx_vec3 a, lx_vec3 b, lx_vec3 c)
+{
+    return angle_at(a, b, c) + angle_at(b, c, a) + angle_at(c, a, b) - 3.14159265358979323846;
+}
+
+static void spherical_triangle_knows_its_solid_angle_and_samples_it_evenly(void **state)
+{
+    (void)state;
+    static const lx_vec3 cases[][3] = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, // an eighth of the sphere
+                                       {{-1, -1, 0.5f}, {2, -1, 0.5f}, {0, 3, 0.7f}}, {{4, 1, 2}, {4, 2, 2}, {3, 1, 3}}, {{0, 0, -1}, {0.1f, 0, -1}, {0, 5, 1}}};
+    const double eighth = (double)lx_spherical_triangle_of(cases[0]).solid_angle;
+    assert_true(fabs(eighth - 3.14159265358979323846 / 2) < 1e-6);
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
+        const lx_spherical_triangle t = lx_spherical_triangle_of(cases[k]);
+        lx_vec3 a = lx_normalize_or(cases[k][0], (lx_vec3){0, 0, 0}), b = lx_normalize_or(cases[k][1], a), c = lx_normalize_or(cases[k][2], a);
+        const double all = solid_angle_by_angles(a, b, c);
+        assert_true(fabs((double)t.solid_angle - all) < 1e-5 * all + 2e-6);
+        // Counts by the inverse of the map: the share of the triangle on a's side of the arc from b through the sample, and how far along that arc it lies.
+        uint32_t counts[cell_count] = {0};
+        for (uint32_t i = 0; i < sample_count; ++i) {
+            const lx_vec3 d = lx_sample_spherical_triangle(&t, random_pair(i));
+            assert_true(fabsf(lx_length(d) - 1) < 1e-5f);
+            lx_vec3 on_arc = lx_normalize_or(lx_cross(lx_cross(b, d), lx_cross(a, c)), c);
+            if (lx_dot(on_arc, lx_add(a, c)) < 0) on_arc = lx_neg(on_arc);
+            const double left = solid_angle_by_angles(a, b, on_arc);
+            count_cell(counts, lx_clamp((float)(left / all), 0, 0.99999f), lx_clamp((1 - lx_dot(d, b)) / (1 - lx_dot(on_arc, b)), 0, 0.99999f));
+        }
+        check_uniform_counts(counts);
+    }
+    const lx_vec3 flat[3] = {{1, 0, 0}, {2, 0, 0}, {3, 0, 0}};
+    assert_true(lx_spherical_triangle_of(flat).solid_angle == 0);
+}
+
 static void range_and_spot_factors_follow_the_khronos_formulas(void **state)
 {
     (void)state;
@@ -151,6 +192,7 @@ int main(void)
         cmocka_unit_test(cone_has_the_density_it_states),
         cmocka_unit_test(triangle_points_are_uniform_by_area),
         cmocka_unit_test(spherical_rectangle_knows_its_solid_angle_and_samples_it_evenly),
+        cmocka_unit_test(spherical_triangle_knows_its_solid_angle_and_samples_it_evenly),
         cmocka_unit_test(range_and_spot_factors_follow_the_khronos_formulas),
         cmocka_unit_test(offset_origins_leave_the_surface_at_any_scale),
     };
