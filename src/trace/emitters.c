@@ -301,7 +301,7 @@ static const lx_emitter_triangle *choose_triangle(const lx_emitters *emitters, u
 static bool see_triangle(const lx_emitter_triangle *t, lx_vec3 viewer, lx_spherical_triangle *out)
 {
     static const float near_areas = 16; // square of the distance over the area
-    static const float least_angle = 1e-3f, most_angle = 6.2f; // whose directions and areas can be told
+    static const float least_angle = 1e-3f, most_angle = 3; // below, precision ends; above, cosine-weighted rays do better
     if (t->grid != 1) return false;
     const lx_vec3 a = lx_sub(t->origin, viewer), corner[3] = {a, lx_add(a, t->edge1), lx_add(a, t->edge2)};
     const lx_vec3 centre = lx_mad(a, lx_add(t->edge1, t->edge2), 1.0f / 3);
