@@ -37,7 +37,7 @@ static const struct {
     .pass_rows = 1,
     .place = 2 * sizeof(uint32_t),
     .tile = 4 * sizeof(double) + 1,
-    .batches = 8 << 20,
+    .batches = 6 << 20,
     .worker_row = 3 * lx_luxel_tile_edge * lx_luxel_tile_edge * 3 * sizeof(float),
     .worker_cell = lx_luxel_tile_edge * lx_luxel_tile_edge * (sizeof(lx_rgb) + sizeof(float)),
 };
