@@ -22,7 +22,6 @@ static const uint32_t cache_stream = 0x63616368;
 static lx_rgb mean_albedo(const lx_gather_job *g, lx_texel *t)
 {
     enum { places = 8 };
-    lx_ray rays[places];
     lx_hit hits[places];
     lx_shading shading[places];
     for (uint32_t k = 0; k < places; ++k) {
@@ -30,10 +29,9 @@ static lx_rgb mean_albedo(const lx_gather_job *g, lx_texel *t)
         const lx_piece *piece = lx_texel_site(t, k * (lx_site_count / places), &r);
         const lx_fragment *f = &t->fragments[piece->fragment];
         const lx_vec2 b = lx_piece_barycentrics(piece, r.position);
-        rays[k] = (lx_ray){.origin = r.position, .direction = lx_neg(r.geometric_normal), .t_max = 1};
         hits[k] = (lx_hit){.surface = f->surface, .triangle = f->triangle, .u = b.x, .v = b.y};
     }
-    lx_shade_hits(g->bake->tracer, rays, hits, shading, places);
+    lx_shade_materials(g->bake->tracer, hits, shading, places);
     lx_rgb sum = {0, 0, 0};
     for (uint32_t k = 0; k < places; ++k) sum = lx_rgb_add(sum, shading[k].albedo);
     return lx_rgb_scale(sum, 1.0f / places);

@@ -155,7 +155,7 @@ static void trace_sights(const picture_job *job, picture_scratch *s, size_t coun
     const lx_tracer *tracer = job->picture->tracer;
     for (uint32_t sheet = 0; count > 0 && sheet < most_layers; ++sheet) {
         lx_trace_closest(tracer, s->rays, s->hits, count);
-        lx_shade_hits(tracer, s->rays, s->hits, s->shading, count);
+        lx_shade_hits(tracer, s->hits, s->shading, count);
         size_t traced = 0, mixed = 0, going_on = 0;
         for (size_t i = 0; i < count; ++i) {
             sight see = s->sights[i];

@@ -52,7 +52,7 @@ static lx_result look(const lx_baked *baked, const lx_tracer *tracer, seen_batch
 {
     for (uint32_t sheet = 0; count > 0 && sheet < most_sheets; ++sheet) {
         lx_trace_closest(tracer, b->rays, b->hits, count);
-        lx_shade_hits(tracer, b->rays, b->hits, b->shading, count);
+        lx_shade_hits(tracer, b->hits, b->shading, count);
         size_t going_on = 0;
         for (size_t i = 0; i < count; ++i) {
             const lx_hit *hit = &b->hits[i];

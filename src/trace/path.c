@@ -224,7 +224,7 @@ static size_t land_flights(lx_path_batch *b, const lx_path_settings *settings, s
     size_t next_count = 0;
     while (count > 0) {
         lx_trace_closest(settings->tracer, b->rays, b->hits, count);
-        lx_shade_hits(settings->tracer, b->rays, b->hits, b->shading, count);
+        lx_shade_hits(settings->tracer, b->hits, b->shading, count);
         b->ray_count += count;
         size_t in_flight = 0;
         for (size_t i = 0; i < count; ++i) {

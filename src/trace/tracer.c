@@ -632,9 +632,8 @@ static void prefetch_next(const lx_tracer *tracer, const lx_hit *hits, size_t i,
     if (i + corners_ahead < count) prefetch_corners(tracer, &hits[i + corners_ahead]);
 }
 
-void lx_shade_hits(const lx_tracer *tracer, const lx_ray *rays, const lx_hit *hits, lx_shading *shading, size_t count)
+void lx_shade_hits(const lx_tracer *tracer, const lx_hit *hits, lx_shading *shading, size_t count)
 {
-    (void)rays;
     prefetch_first(tracer, hits, count);
     for (size_t i = 0; i < count; ++i) {
         prefetch_next(tracer, hits, i, count);

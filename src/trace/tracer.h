@@ -84,7 +84,7 @@ typedef struct lx_patch {
 /// too often rather than too rarely. Surfaces that only touch a patch along its edge, as walls do the floor of their room, do not count. Thread-safe.
 bool lx_trace_crowded(const lx_tracer *tracer, const lx_patch *patches, size_t count);
 /// Shades hits; misses are skipped. Thread-safe.
-void lx_shade_hits(const lx_tracer *tracer, const lx_ray *rays, const lx_hit *hits, lx_shading *shading, size_t count);
+void lx_shade_hits(const lx_tracer *tracer, const lx_hit *hits, lx_shading *shading, size_t count);
 /// The same, but positions and normals are left as they are.
 void lx_shade_materials(const lx_tracer *tracer, const lx_hit *hits, lx_shading *shading, size_t count);
 
