@@ -39,8 +39,8 @@ static void record(recording *r, const lx_ray *rays, size_t count)
 void __real_lx_accel_closest(const lx_accel *accel, const lx_ray *rays, lx_hit *hits, size_t count);
 void __real_lx_accel_transmittance(const lx_accel *accel, const lx_ray *rays, lx_rgb *transmittance, size_t count);
 void __wrap_lx_accel_closest(const lx_accel *accel, const lx_ray *rays, lx_hit *hits, size_t count);
-bool __wrap_lx_direct_light(lx_direct_batch *b, const lx_direct_settings *settings, const lx_direct_tile *tile, uint32_t source, lx_rgb *mean, float *variance);
 void __wrap_lx_accel_transmittance(const lx_accel *accel, const lx_ray *rays, lx_rgb *transmittance, size_t count);
+bool __wrap_lx_direct_light(lx_direct_batch *b, const lx_direct_settings *settings, const lx_direct_tile *tile, uint32_t source, lx_rgb *mean, float *variance);
 lx_result __real_lx_pool_run(lx_pool *pool, size_t count, lx_task task, void *user, const char *stage, const lx_progress_sink *sink, lx_error *error);
 lx_result __wrap_lx_pool_run(lx_pool *pool, size_t count, lx_task task, void *user, const char *stage, const lx_progress_sink *sink, lx_error *error);
 lx_result __real_lx_pool_run_weighted(lx_pool *pool, size_t count, const float *weights, lx_task task, void *user, const char *stage,

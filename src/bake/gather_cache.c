@@ -271,7 +271,7 @@ static lx_result pass_tile(void *user, size_t task, uint32_t worker, lx_error *e
     const lx_gather_job *g = user;
     const lx_luxel_tile *tile = &g->job->map.tiles[task];
     // What recorded paths found behind a near hit is a bounce further: where bounces are counted, of the pass before.
-    const uint16_t *from = g->rows[0], *from_later = lx_gather_is_truncated(g) ? g->rows[2] : g->rows[0];
+    const uint16_t *from = g->rows[0], *from_later = !lx_gather_is_truncated(g) ? g->rows[0] : g->pass > 0 ? g->rows[2] : NULL; // before the first pass there was none
     float *sums = g->scratch[worker].sums;
     double *change = g->pass_change + task * g->layer_count, *energy = g->pass_energy + task * g->layer_count;
     memset(change, 0, g->layer_count * sizeof *change);
@@ -289,6 +289,7 @@ static lx_result pass_tile(void *user, size_t task, uint32_t worker, lx_error *e
             if (hits[k] != LX_NO_LUXEL) lx_row_add(sums, from + g->row_stride * hits[k], g->stride);
         for (; extra < extras->count && extras->items[extra].target == i; ++extra) {
             const lx_gather_extra *e = &extras->items[extra];
+            if (!from_later) continue;
             const float weight[3] = {e->weight.r, e->weight.g, e->weight.b};
             lx_row_add_scaled(sums, from_later + g->row_stride * e->luxel, g->row_layers, weight);
         }

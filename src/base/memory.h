@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/// count × size bytes, uninitialised or zeroed. Zero elements give a valid, freeable pointer. NULL on overflow or lack of memory.
+/// count × size bytes, uninitialised (those aligned to cache lines, if they fill one) or zeroed. Zero elements give a valid, freeable pointer. NULL on overflow or lack of memory.
 void *lx_malloc_array(size_t count, size_t size);
 void *lx_calloc_array(size_t count, size_t size);
 void lx_free(void *memory);

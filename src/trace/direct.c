@@ -94,6 +94,7 @@ typedef struct job {
     uint32_t samples; // of a luxel, at most (of a uniform sky, times its weight there)
     uint32_t first_samples; // of which so many come first, then four times as many, and so on
     bool is_sharp, is_uniform_sky;
+    bool is_beside; // nearness may be more than 1
     bool has_views;
     uint32_t viewed; // luxel that the view is of; most_luxels: none yet
     spread even, shadowed; // of luxels whose shadows are known, and of others
@@ -220,15 +221,24 @@ static uint32_t weight_at(const job *j, uint32_t luxel)
 // Beside a small lamp light is so bright, and changes so much over a luxel, that a few such luxels hold most of a picture's error: they take more samples.
 static uint32_t nearness(const job *j, uint32_t luxel)
 {
-    const lx_source_sphere *lamp = &j->tracer->source_spheres[j->source];
-    if (j->is_sharp || j->cells > 1 || !(lamp->power < INFINITY)) return 1;
+    if (!j->is_beside) return 1;
+    const lx_vec3 lamp = j->tracer->source_spheres[j->source].centre;
     const lx_receiver *sites = &j->tile->sites[(size_t)luxel * lx_direct_sites];
     float width = 0, distance = INFINITY;
     for (int k = 0; k < lx_direct_sites; ++k) {
         width = lx_max(width, lx_distance(sites[k].position, sites[0].position));
-        distance = lx_min(distance, lx_distance(sites[k].position, lamp->centre));
+        distance = lx_min(distance, lx_distance(sites[k].position, lamp));
     }
     return distance < width ? runs * runs : distance < 2 * width ? runs : 1;
+}
+
+// Can it be, of any of the tile's luxels? Their widths are at most two radii of its bounds.
+static bool may_be_beside(const job *j)
+{
+    const lx_source_sphere *lamp = &j->tracer->source_spheres[j->source];
+    if (j->is_sharp || j->cells > 1 || !(lamp->power < INFINITY)) return false;
+    const lx_direct_bounds *bounds = j->tile->bounds;
+    return !bounds || lx_distance(bounds->centre, lamp->centre) < 5.01f * bounds->radius;
 }
 
 static uint32_t most_samples(const job *j, uint32_t luxel)
@@ -580,6 +590,7 @@ bool lx_direct_light(lx_direct_batch *b, const lx_direct_settings *settings, con
     j.is_sharp = is_sharp(tracer, source);
     j.samples = j.is_sharp ? (uint32_t)lx_direct_sites : settings->samples * j.weight;
     j.first_samples = j.samples;
+    j.is_beside = may_be_beside(&j);
     j.has_views = lx_source_has_views(tracer, source);
     j.is_uniform_sky = is_uniform_sky(tracer, source);
     j.viewed = most_luxels;

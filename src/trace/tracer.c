@@ -632,6 +632,12 @@ static void prefetch_next(const lx_tracer *tracer, const lx_hit *hits, size_t i,
     if (i + corners_ahead < count) prefetch_corners(tracer, &hits[i + corners_ahead]);
 }
 
+static void find_place(const lx_tracer *tracer, const lx_hit *hit, lx_vec3 *position, lx_vec3 *geometric, lx_vec3 *normal)
+{
+    lx_hit_geometry(tracer, hit, position, geometric);
+    *normal = interpolated_normal(&tracer->surfaces[hit->surface], hit->triangle, hit->u, hit->v, *geometric);
+}
+
 void lx_shade_hits(const lx_tracer *tracer, const lx_hit *hits, lx_shading *shading, size_t count)
 {
     prefetch_first(tracer, hits, count);
@@ -639,8 +645,7 @@ void lx_shade_hits(const lx_tracer *tracer, const lx_hit *hits, lx_shading *shad
         prefetch_next(tracer, hits, i, count);
         if (hits[i].surface == LX_MISS) continue;
         lx_shading *s = &shading[i];
-        lx_hit_geometry(tracer, &hits[i], &s->position, &s->geometric_normal);
-        s->normal = interpolated_normal(&tracer->surfaces[hits[i].surface], hits[i].triangle, hits[i].u, hits[i].v, s->geometric_normal);
+        find_place(tracer, &hits[i], &s->position, &s->geometric_normal, &s->normal);
         shade(tracer, &hits[i], s);
     }
 }
@@ -660,8 +665,7 @@ void lx_hit_receivers(const lx_tracer *tracer, const lx_hit *hits, lx_receiver *
         const lx_hit *hit = &hits[i];
         lx_receiver *r = &receivers[i];
         prefetch_next(tracer, hits, i, count);
-        lx_hit_geometry(tracer, hit, &r->position, &r->geometric_normal);
-        r->normal = interpolated_normal(&tracer->surfaces[hit->surface], hit->triangle, hit->u, hit->v, r->geometric_normal);
+        find_place(tracer, hit, &r->position, &r->geometric_normal, &r->normal);
         if (!hit->back) continue;
         r->normal = lx_neg(r->normal);
         r->geometric_normal = lx_neg(r->geometric_normal);

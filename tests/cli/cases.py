@@ -406,6 +406,19 @@ def bake_sky_is_a_layer():
 
 
 @case
+def bake_same_bytes_whatever_memory_held_before():
+    write("room.glb", scenes.GOOD)
+    for bounces in ("1", "3", "inf"):
+        packs = []
+        for fill in ("0", "85", "170"):  # glibc fills fresh blocks with it
+            os.environ["MALLOC_PERTURB_"] = fill
+            luxel("bake", "room.glb", "-o", "room.baked", "--page-size", "64", "--samples", "16", "--quiet", "--no-preview", "--bounces", bounces)
+            packs.append(read("room.baked/luxel.pack"))
+        expect(packs[0] == packs[1] == packs[2], "%s bounces: other bytes with other memory" % bounces)
+    del os.environ["MALLOC_PERTURB_"]
+
+
+@case
 def bake_same_bytes_for_any_number_of_threads():
     for threads in ("1", "2", "3"):
         bake("t" + threads, "--no-preview", "--format", "ktx2,exr", "--threads", threads)
