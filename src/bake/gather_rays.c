@@ -12,6 +12,7 @@
 
 enum {
     batch_size = lx_gather_batch_size,
+    block_size = 128,      // hits whose places are fetched before they are read
     look_ahead = 48,       // rows that are fetched before they are added
     triangles_ahead = 16,  // of the lookup, before they are read
     near_until = 4,        // vertices; paths caught in a corner are looked up all the same
@@ -54,7 +55,6 @@ struct lx_gather_batch {
     float cosines[batch_size];
     uint32_t streams[batch_size], samples[batch_size];
     float x[batch_size], y[batch_size], z[batch_size]; // local directions
-    pending pending[batch_size];
     uint32_t found[batch_size], found_target[batch_size];
     // The second loop; what arrives while it is full waits for its turn.
     lx_ray slow_rays[2 * batch_size];
@@ -426,16 +426,13 @@ static void fetch_triangle(const lx_lookup *lookup, const lx_hit *hit)
     if (triangles) __builtin_prefetch(triangles + hit->triangle);
 }
 
-static void first_hits(lx_gather_batch *b, const lx_gather_settings *settings, const lx_gather_start *starts, size_t count, uint32_t first_start,
-                       const lx_gather_output *out)
+// What is done with hits first … end - 1 of the first rays: `b->found` tells the start of each. Adds to the luxels that were found (at or before the hits in b->found).
+static size_t look_up(lx_gather_batch *b, const lx_gather_settings *settings, const lx_gather_start *starts, size_t first, size_t end, size_t made, size_t found_count,
+                      uint32_t first_start, const lx_gather_output *out)
 {
-    const size_t made = make_rays(b, starts, count);
-    lx_trace_closest(settings->tracer, b->rays, b->hits, made);
-    b->ray_count += made;
-    for (size_t i = 0; out->distances && i < made; ++i)
-        if (b->hits[i].surface != LX_MISS) out->distances[first_start + b->found[i]] = b->hits[i].t;
+    pending pending_hits[block_size];
     size_t pending_count = 0;
-    for (size_t i = 0; i < made; ++i) {
+    for (size_t i = first; i < end; ++i) {
         const lx_hit *hit = &b->hits[i];
         const lx_gather_start *start = &starts[b->found[i]];
         if (i + triangles_ahead < made) fetch_triangle(settings->lookup, hit + triangles_ahead);
@@ -451,18 +448,17 @@ static void first_hits(lx_gather_batch *b, const lx_gather_settings *settings, c
         if (may_look_up) {
             const lx_taps taps = lx_lookup_taps(settings->lookup, hit, tap_bits(start->stream, 0, start->sample));
             lx_lookup_fetch(settings->lookup, taps);
-            b->pending[pending_count++] = (pending){taps, (uint32_t)i, near};
+            pending_hits[pending_count++] = (pending){taps, (uint32_t)i, near};
             continue;
         }
         const flight f = first_flight(start, b->cosines[i]);
         send(b, &b->rays[i], hit, &f);
     }
-    size_t found_count = 0;
     for (size_t k = 0; k < pending_count; ++k) {
-        const uint32_t i = b->pending[k].index;
+        const uint32_t i = pending_hits[k].index;
         const lx_gather_start *start = &starts[b->found[i]];
-        const uint32_t luxel = lx_lookup_luxel(settings->lookup, b->pending[k].taps);
-        if (luxel >= LX_SILENT || b->pending[k].near) {
+        const uint32_t luxel = lx_lookup_luxel(settings->lookup, pending_hits[k].taps);
+        if (luxel >= LX_SILENT || pending_hits[k].near) {
             const flight f = first_flight(start, b->cosines[i]);
             if (!leave_unshaded(b, settings, &f, &b->hits[i], luxel)) send(b, &b->rays[i], &b->hits[i], &f);
         } else if (out->luxels) {
@@ -473,6 +469,20 @@ static void first_hits(lx_gather_batch *b, const lx_gather_settings *settings, c
             b->found_target[found_count++] = target;
         }
     }
+    return found_count;
+}
+
+static void first_hits(lx_gather_batch *b, const lx_gather_settings *settings, const lx_gather_start *starts, size_t count, uint32_t first_start,
+                       const lx_gather_output *out)
+{
+    const size_t made = make_rays(b, starts, count);
+    lx_trace_closest(settings->tracer, b->rays, b->hits, made);
+    b->ray_count += made;
+    for (size_t i = 0; out->distances && i < made; ++i)
+        if (b->hits[i].surface != LX_MISS) out->distances[first_start + b->found[i]] = b->hits[i].t;
+    size_t found_count = 0;
+    for (size_t i = 0; i < made; i += block_size)
+        found_count = look_up(b, settings, starts, i, i + block_size < made ? i + block_size : made, made, found_count, first_start, out);
     if (settings->rows && !out->luxels) add_rows(b, settings, out, found_count);
     add_slow_rows(b, settings, out);
     leave_all(b, settings, out);

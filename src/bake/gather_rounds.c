@@ -11,7 +11,7 @@
 enum {
     first_round = 32,      // rays a luxel
     enough_luxels = 64,    // of a tile, to tell its error from one pair of halves each
-    rays_per_site = 8,     // in a round
+    rays_per_site = 16,    // in a round
 };
 
 // The round's rays of luxels first … end - 1 of the list; the first half of a luxel's samples and the second have sums of their own.

@@ -306,10 +306,11 @@ static bool is_crowded(lx_texel *t)
     for (uint32_t i = 0; i < t->fragment_count; ++i) {
         const lx_piece *piece = lx_texel_piece(t, i);
         lx_patch *patch = &patches[i];
-        *patch = (lx_patch){.normal = piece->normal, .corner_count = (uint32_t)piece->part.count};
-        for (int k = 0; k < piece->part.count; ++k) {
-            patch->corners[k] = lx_piece_point(piece, piece->part.p[k]);
-            patch->centre = lx_mad(patch->centre, patch->corners[k], 1.0f / (float)piece->part.count);
+        const lx_polygon *part = lx_texel_part(t, piece);
+        *patch = (lx_patch){.normal = piece->normal, .corner_count = (uint32_t)part->count};
+        for (int k = 0; k < part->count; ++k) {
+            patch->corners[k] = lx_piece_point(piece, part->p[k]);
+            patch->centre = lx_mad(patch->centre, patch->corners[k], 1.0f / (float)part->count);
         }
     }
     return lx_trace_crowded(t->bake->tracer, patches, t->fragment_count);

@@ -43,15 +43,14 @@ const lx_piece *lx_texel_piece(lx_texel *t, uint32_t fragment)
     piece->fragment = fragment;
     lx_triangle_on_page(t->bake->atlas, surface->instance, surface->primitive, f->triangle, piece->corner);
     piece->whole = lx_cross_of(piece->corner[0], piece->corner[1], piece->corner[2]);
-    piece->part = lx_clip_to_texel(piece->corner, t->x, t->y);
+    piece->clipped = false;
     lx_triangle_corners(tracer, f->surface, f->triangle, piece->world);
-    lx_vec3 at;
-    lx_hit_geometry(tracer, &(lx_hit){.surface = f->surface, .triangle = f->triangle}, &at, &piece->normal);
+    piece->normal = lx_triangle_normal(tracer, f->surface, piece->world);
     piece->smooth = lx_triangle_normals(tracer, f->surface, f->triangle, piece->vertex_normal);
     piece->shading_normal = piece->normal;
     if (piece->smooth && are_equal(piece->vertex_normal)) { // as exporters write faces with hard edges
         piece->smooth = false;
-        piece->shading_normal = lx_normal_at(tracer, f->surface, f->triangle, 0, 0);
+        piece->shading_normal = lx_normal_at(tracer, f->surface, f->triangle, 0, 0, piece->normal);
     }
     const lx_vec3 cross = lx_cross(lx_sub(piece->world[1], piece->world[0]), lx_sub(piece->world[2], piece->world[0]));
     piece->texel_m = (float)sqrt((double)lx_length(cross) / fabs(piece->whole));
@@ -76,6 +75,14 @@ static lx_vec2 onto_triangle(lx_vec2 b)
 static lx_vec3 blend(const lx_piece *piece, lx_vec2 b)
 {
     return lx_add(lx_add(lx_scale(piece->world[0], 1 - b.x - b.y), lx_scale(piece->world[1], b.x)), lx_scale(piece->world[2], b.y));
+}
+
+const lx_polygon *lx_texel_part(lx_texel *t, const lx_piece *piece)
+{
+    lx_piece *own = &t->pieces[piece->fragment % lx_piece_slots];
+    if (!own->clipped) own->part = lx_clip_to_texel(own->corner, t->x, t->y);
+    own->clipped = true;
+    return &own->part;
 }
 
 lx_vec3 lx_piece_point(const lx_piece *piece, lx_point on_page)
@@ -127,7 +134,7 @@ static const lx_piece *choose(lx_texel *t, lx_vec2 u, lx_vec2 *out_b)
         while (chosen + 1 < t->fragment_count && along > t->fragments[chosen].area) along -= t->fragments[chosen++].area;
         best = lx_texel_piece(t, chosen);
         u.x = lx_clamp(along / t->fragments[chosen].area, 0, 1);
-        *out_b = barycentrics(best, point_in(&best->part, u));
+        *out_b = barycentrics(best, point_in(lx_texel_part(t, best), u));
     }
     *out_b = onto_triangle(*out_b);
     return best;
@@ -161,7 +168,7 @@ const lx_piece *lx_texel_site(lx_texel *t, uint32_t number, lx_receiver *out)
     out->geometric_normal = piece->normal;
     out->normal = piece->shading_normal;
     if (piece->smooth) {
-        out->normal = lx_normal_at(t->bake->tracer, f->surface, f->triangle, b.x, b.y);
+        out->normal = lx_normal_at(t->bake->tracer, f->surface, f->triangle, b.x, b.y, piece->normal);
         out->position = lift(t->bake->tracer, piece, b, out->position);
     }
     return piece;

@@ -10,7 +10,8 @@ typedef struct lx_piece {
     uint32_t fragment;  ///< UINT32_MAX: an empty slot.
     lx_point corner[3]; ///< Of its triangle, on the page.
     double whole;       ///< Twice the triangle's area there, with sign.
-    lx_polygon part;    ///< Within the texel.
+    lx_polygon part;    ///< Within the texel, where `clipped`: lx_texel_part.
+    bool clipped;
     lx_vec3 world[3], vertex_normal[3];
     lx_vec3 normal;     ///< Geometric.
     bool smooth;        ///< False: its vertex normals are all `normal`, or equal each other: `shading_normal`.
@@ -30,6 +31,9 @@ typedef struct lx_texel {
 
 void lx_texel_open(lx_texel *t, const lx_bake *bake, const lx_luxel_page *page, uint32_t texel);
 const lx_piece *lx_texel_piece(lx_texel *t, uint32_t fragment);
+
+/// The part of a piece's triangle within the texel. Sites of texels that are covered all over do without.
+const lx_polygon *lx_texel_part(lx_texel *t, const lx_piece *piece);
 
 /// A place on a piece's triangle, in the world.
 lx_vec3 lx_piece_point(const lx_piece *piece, lx_point on_page);

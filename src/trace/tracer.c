@@ -464,9 +464,9 @@ void lx_ray_step_past(lx_ray *ray, const lx_hit *hit)
     ray->t_min = next > hit->t ? next : nextafterf(hit->t, INFINITY);
 }
 
-static lx_vec3 geometric_normal(const lx_tracer *tracer, uint32_t surface, const lx_vec3 corner[3])
+lx_vec3 lx_triangle_normal(const lx_tracer *tracer, uint32_t surface, const lx_vec3 corners[3])
 {
-    const lx_vec3 cross = lx_cross(lx_sub(corner[1], corner[0]), lx_sub(corner[2], corner[0]));
+    const lx_vec3 cross = lx_cross(lx_sub(corners[1], corners[0]), lx_sub(corners[2], corners[0]));
     return lx_scale(lx_normalize_or(cross, (lx_vec3){0, 1, 0}), tracer->surfaces[surface].orientation);
 }
 
@@ -492,7 +492,7 @@ void lx_hit_geometry(const lx_tracer *tracer, const lx_hit *hit, lx_vec3 *positi
     lx_vec3 c[3];
     lx_triangle_corners(tracer, hit->surface, hit->triangle, c);
     *position = lx_add(lx_add(lx_scale(c[0], 1 - hit->u - hit->v), lx_scale(c[1], hit->u)), lx_scale(c[2], hit->v));
-    *normal = geometric_normal(tracer, hit->surface, c);
+    *normal = lx_triangle_normal(tracer, hit->surface, c);
 }
 
 bool lx_triangle_normals(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, lx_vec3 normals[3])
@@ -504,11 +504,9 @@ bool lx_triangle_normals(const lx_tracer *tracer, uint32_t surface, uint32_t tri
     return true;
 }
 
-lx_vec3 lx_normal_at(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, float u, float v)
+lx_vec3 lx_normal_at(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, float u, float v, lx_vec3 geometric)
 {
-    lx_vec3 corners[3];
-    lx_triangle_corners(tracer, surface, triangle, corners);
-    return interpolated_normal(&tracer->surfaces[surface], triangle, u, v, geometric_normal(tracer, surface, corners));
+    return interpolated_normal(&tracer->surfaces[surface], triangle, u, v, geometric);
 }
 
 bool lx_surface_is_plain(const lx_tracer *tracer, uint32_t surface)

@@ -96,8 +96,10 @@ void lx_hit_geometry(const lx_tracer *tracer, const lx_hit *hit, lx_vec3 *positi
 void lx_triangle_corners(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, lx_vec3 corners[3]);
 /// Unit vertex normals of a triangle in world space; false if it is flat-shaded.
 bool lx_triangle_normals(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, lx_vec3 normals[3]);
-/// Interpolated unit normal at barycentrics (u, v), on the front side.
-lx_vec3 lx_normal_at(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, float u, float v);
+/// Its unit geometric normal, on the front side.
+lx_vec3 lx_triangle_normal(const lx_tracer *tracer, uint32_t surface, const lx_vec3 corners[3]);
+/// Interpolated unit normal at barycentrics (u, v), on the front side; `geometric` where there is none.
+lx_vec3 lx_normal_at(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, float u, float v, lx_vec3 geometric);
 /// Does the surface shine or shade from its back too?
 bool lx_surface_is_double_sided(const lx_tracer *tracer, uint32_t surface);
 /// Is a hit on its front (or on its back, which is black unless it is double-sided) all there is to know of it: opaque, and no light source?
