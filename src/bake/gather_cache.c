@@ -50,6 +50,19 @@ static lx_gather_luxel describe(const lx_gather_job *g, uint32_t luxel, const lx
     return out;
 }
 
+// Paths that meet an invalid luxel ask it for its albedo alone.
+static void describe_invalid(const lx_gather_job *g, const lx_luxel_tile *tile)
+{
+    for (uint32_t i = tile->first; i < tile->first + tile->count; ++i) {
+        if (g->job->map.valid[i]) continue;
+        uint32_t texel;
+        const lx_luxel_page *page = lx_job_page(g->job, i, &texel);
+        lx_texel t;
+        lx_texel_open(&t, g->bake, page, texel);
+        g->luxels[i] = (lx_gather_luxel){.albedo = mean_albedo(g, &t)};
+    }
+}
+
 // ---- direct light and the cache's rays -----------------------------------------------------------------------------------------------
 
 static bool is_near(const lx_gather_job *g, uint32_t luxel, uint32_t source)
@@ -228,6 +241,7 @@ static lx_result light_tile(void *user, size_t task, uint32_t worker, lx_error *
     memset(s->sky_light, 0, s->count * sizeof *s->sky_light);
     const bool bounces = g->settings.bounces > 0;
     for (uint32_t i = 0; bounces && i < s->count; ++i) g->luxels[s->luxel[i]] = describe(g, s->luxel[i], &s->sites[(size_t)i * lx_site_count]);
+    if (bounces) describe_invalid(g, tile);
     if (bounces || g->interpolates || g->samples_sky) { // direct light must know as well
         memset(s->met, 0, row_values * sizeof *s->met);
         memset(s->near_light, 0, row_values * sizeof *s->near_light);

@@ -49,12 +49,17 @@ typedef struct slow_row {
     lx_rgb weight;
 } slow_row;
 
+// Whose directions are wanted: of sample `samples` of the stream, from vertex `vertices`.
+typedef struct direction_keys {
+    uint32_t streams[2 * batch_size], samples[2 * batch_size], vertices[2 * batch_size];
+} direction_keys;
+
 struct lx_gather_batch {
     lx_ray rays[batch_size];
     lx_hit hits[batch_size];
     float cosines[batch_size];
-    uint32_t streams[batch_size], samples[batch_size];
-    float x[batch_size], y[batch_size], z[batch_size]; // local directions
+    direction_keys keys;
+    float x[2 * batch_size], y[2 * batch_size], z[2 * batch_size]; // local directions
     uint32_t found[batch_size], found_target[batch_size];
     // The second loop; what arrives while it is full waits for its turn.
     lx_ray slow_rays[2 * batch_size];
@@ -197,6 +202,36 @@ static inline lx_vec3 cosine_direction(lx_vec2 u)
     return (lx_vec3){radius * cosine, radius * sine, sqrtf(1 - u.x)};
 }
 
+// Local directions of rays: [PBR4]'s cosine-weighted ones of a Sobol point each, in plain loops that compilers turn into vectors.
+static inline __attribute__((always_inline)) void make_directions(const direction_keys *restrict keys, size_t count, float *restrict x, float *restrict y,
+                                                                  float *restrict z)
+{
+    for (size_t i = 0; i < count; ++i) {
+        const lx_vec3 d = cosine_direction(lx_sobol_pair(keys->samples[i], dimension_key(keys->streams[i], keys->vertices[i], dimension_bounce)));
+        x[i] = d.x;
+        y[i] = d.y;
+        z[i] = d.z;
+    }
+}
+
+#if defined(__x86_64__)
+__attribute__((target("avx2"))) static void make_directions_avx2(const direction_keys *keys, size_t count, float *x, float *y, float *z)
+{
+    make_directions(keys, count, x, y, z);
+}
+#endif
+
+static void find_directions(lx_gather_batch *b, size_t count)
+{
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx2")) {
+        make_directions_avx2(&b->keys, count, b->x, b->y, b->z);
+        return;
+    }
+#endif
+    make_directions(&b->keys, count, b->x, b->y, b->z);
+}
+
 // Random bits of the tap at a hit: the same whichever loop looks it up.
 static uint32_t tap_bits(uint32_t stream, uint32_t vertex, uint32_t sample)
 {
@@ -223,7 +258,7 @@ static bool sample_light(const lx_gather_settings *settings, uint32_t source, co
     const float chance = lx_light_roulette(f->stream, f->sample, key ^ 0x68bc21ebu, brightness * bound / bound_excess, scale);
     if (chance == 0) return false;
     const lx_vec2 u = lx_sobol_pair(f->sample, lx_hash_combine(f->stream, key));
-    if (!lx_sample_source(tracer, source, &v->receiver, u, 1, ray, light, cell)) return false;
+    if (!lx_sample_source_by_power(tracer, source, &v->receiver, u, 1, ray, light, cell)) return false;
     *light = lx_rgb_scale(*light, chance);
     const float again = lx_light_roulette(f->stream, f->sample, key ^ 0x02e5be93u, brightness * lx_rgb_max(*light), scale);
     *light = lx_rgb_scale(*light, again);
@@ -233,6 +268,7 @@ static bool sample_light(const lx_gather_settings *settings, uint32_t source, co
 static void flush_shadow_rays(lx_gather_batch *b, const lx_gather_settings *settings, const lx_source_use *use, size_t count,
                               const lx_gather_output *out)
 {
+    if (count == 0) return;
     lx_trace_transmittance(settings->tracer, b->shadow_rays, b->transmittance, count);
     b->ray_count += count;
     for (size_t k = 0; k < count; ++k) {
@@ -262,10 +298,9 @@ static void next_events(lx_gather_batch *b, const lx_gather_settings *settings, 
 
 // ---- paths that go on -------------------------------------------------------------------------------------------------------------
 
-// A ray goes on from `receiver`, if not below its geometric surface; the flight is what it was when it got there.
-static void go_on(lx_gather_batch *b, const lx_receiver *receiver, flight f)
+// A ray goes on from `receiver` in a local direction, if not below its geometric surface; the flight is what it was when it got there.
+static void go_on(lx_gather_batch *b, const lx_receiver *receiver, flight f, lx_vec3 local)
 {
-    const lx_vec3 local = cosine_direction(lx_sobol_pair(f.sample, dimension_key(f.stream, f.vertex + 1, dimension_bounce)));
     const lx_vec3 direction = lx_to_world(receiver->normal, local);
     if (!(lx_dot(direction, receiver->geometric_normal) > 0)) return;
     ++f.vertex;
@@ -329,9 +364,15 @@ static void leave_all(lx_gather_batch *b, const lx_gather_settings *settings, co
     size_t vertex_count = 0;
     lx_hit_receivers(settings->tracer, b->leaving_hits, b->leaving_receivers, b->leaving_count);
     for (size_t i = 0; i < b->leaving_count; ++i) {
+        b->keys.streams[i] = b->leaving[i].stream;
+        b->keys.samples[i] = b->leaving[i].sample;
+        b->keys.vertices[i] = b->leaving[i].vertex + 1;
+    }
+    find_directions(b, b->leaving_count);
+    for (size_t i = 0; i < b->leaving_count; ++i) {
         const uint32_t from = b->leaving[i].from;
         if (from == LX_NO_LUXEL || settings->luxels[from].near_sources) b->vertices[vertex_count++] = (vertex_record){b->leaving_receivers[i], b->leaving[i]};
-        go_on(b, &b->leaving_receivers[i], b->leaving[i]);
+        go_on(b, &b->leaving_receivers[i], b->leaving[i], (lx_vec3){b->x[i], b->y[i], b->z[i]});
     }
     next_events(b, settings, vertex_count, out);
     b->leaving_count = 0;
@@ -346,43 +387,13 @@ static void send(lx_gather_batch *b, const lx_ray *ray, const lx_hit *hit, const
     b->flights[b->slow_count++] = *f;
 }
 
-// Local directions of the first rays: [PBR4]'s cosine-weighted ones of a Sobol point each, in plain loops that compilers turn into vectors.
-static inline __attribute__((always_inline)) void make_directions(const uint32_t *restrict streams, const uint32_t *restrict samples, size_t count,
-                                                                  float *restrict x, float *restrict y, float *restrict z)
-{
-    for (size_t i = 0; i < count; ++i) {
-        const lx_vec3 d = cosine_direction(lx_sobol_pair(samples[i], dimension_key(streams[i], 0, dimension_bounce)));
-        x[i] = d.x;
-        y[i] = d.y;
-        z[i] = d.z;
-    }
-}
-
-#if defined(__x86_64__)
-__attribute__((target("avx2"))) static void make_directions_avx2(const uint32_t *streams, const uint32_t *samples, size_t count, float *x, float *y,
-                                                                 float *z)
-{
-    make_directions(streams, samples, count, x, y, z);
-}
-#endif
-
-static void find_directions(lx_gather_batch *b, size_t count)
-{
-#if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx2")) {
-        make_directions_avx2(b->streams, b->samples, count, b->x, b->y, b->z);
-        return;
-    }
-#endif
-    make_directions(b->streams, b->samples, count, b->x, b->y, b->z);
-}
-
 // Rays from the starts; those below the geometric surface are dropped. Returns how many are left; b->found is the start of each.
 static size_t make_rays(lx_gather_batch *b, const lx_gather_start *starts, size_t count)
 {
     for (size_t i = 0; i < count; ++i) {
-        b->streams[i] = starts[i].stream;
-        b->samples[i] = starts[i].sample;
+        b->keys.streams[i] = starts[i].stream;
+        b->keys.samples[i] = starts[i].sample;
+        b->keys.vertices[i] = 0;
     }
     find_directions(b, count);
     size_t made = 0;
@@ -509,15 +520,24 @@ typedef struct answer {
     bool is_near;   // so near that it tells of direct light at most: the path goes on
 } answer;
 
-static answer slow_lookup(const lx_gather_settings *settings, const flight *f, const lx_hit *hit)
+// Where a hit of the second loop may be looked up, asked for: chart LX_NO_CHART if nowhere.
+static lx_taps slow_taps(const lx_gather_settings *settings, const flight *f, const lx_hit *hit)
 {
+    static const lx_taps none = {.chart = LX_NO_CHART};
     const lx_lookup_surface *surface = &settings->lookup->surfaces[hit->surface];
-    if (hit->back || !surface->triangles || surface->triangles[hit->triangle].chart == LX_NO_CHART) return (answer){LX_NO_LUXEL, false};
-    const bool is_near = hit->t < settings->near_texels * surface->texel_m && f->vertex < near_until;
-    if (is_near && !settings->rows_direct) return (answer){LX_NO_LUXEL, true};
-    return (answer){lx_lookup_luxel(settings->lookup, lx_lookup_taps(settings->lookup, hit, tap_bits(f->stream, f->vertex, f->sample))), is_near};
+    if (hit->back || !surface->triangles || surface->triangles[hit->triangle].chart == LX_NO_CHART) return none;
+    const lx_taps taps = lx_lookup_taps(settings->lookup, hit, tap_bits(f->stream, f->vertex, f->sample));
+    lx_lookup_fetch(settings->lookup, taps);
+    return taps;
 }
 
+static answer slow_lookup(const lx_gather_settings *settings, const flight *f, const lx_hit *hit, lx_taps taps)
+{
+    if (taps.chart == LX_NO_CHART) return (answer){LX_NO_LUXEL, false};
+    const bool is_near = hit->t < settings->near_texels * settings->lookup->surfaces[hit->surface].texel_m && f->vertex < near_until;
+    if (is_near && !settings->rows_direct) return (answer){LX_NO_LUXEL, true};
+    return (answer){lx_lookup_luxel(settings->lookup, taps), is_near};
+}
 
 // Takes note of a look-up; add_slow_rows adds what was noted, fetching ahead.
 static lx_result find_slow_row(lx_gather_batch *b, const lx_gather_settings *settings, const flight *f, uint32_t luxel, const lx_gather_output *out,
@@ -539,10 +559,13 @@ static lx_result find_slow_row(lx_gather_batch *b, const lx_gather_settings *set
 static lx_result finish_simple(lx_gather_batch *b, const lx_gather_settings *settings, size_t *count, const lx_gather_output *out, lx_error *error)
 {
     lx_result result = LX_OK;
+    lx_taps taps[block_size];
     size_t kept = 0;
     for (size_t i = 0; i < *count && result == LX_OK; ++i) {
         const flight *f = &b->flights[i];
         const lx_hit *hit = &b->slow_hits[i];
+        for (size_t k = i; i % block_size == 0 && k < i + block_size && k < *count; ++k)
+            if (b->slow_hits[k].surface != LX_MISS) taps[k % block_size] = slow_taps(settings, &b->flights[k], &b->slow_hits[k]);
         if (hit->surface == LX_MISS) {
             if (brings(settings, f, settings->tracer->source_count - 1)) // the sky, if there is one
                 add_sky(settings, out, f->throughput, f->cosine, f->target, b->slow_rays[i].direction, f->vertex);
@@ -551,7 +574,7 @@ static lx_result finish_simple(lx_gather_batch *b, const lx_gather_settings *set
         const lx_lookup_surface *surface = &settings->lookup->surfaces[hit->surface];
         if (surface->plain) {
             if ((hit->back && !surface->double_sided) || f->vertex >= settings->bounces) continue; // black
-            const answer known = slow_lookup(settings, f, hit);
+            const answer known = slow_lookup(settings, f, hit, taps[i % block_size]);
             if (known.luxel < LX_SILENT && !known.is_near) {
                 result = find_slow_row(b, settings, f, known.luxel, out, error);
                 continue;
@@ -592,7 +615,7 @@ static lx_result step(lx_gather_batch *b, const lx_gather_settings *settings, co
                 continue;
             }
             if (!m->lit || f.vertex >= settings->bounces) continue;
-            const answer known = slow_lookup(settings, &f, hit);
+            const answer known = slow_lookup(settings, &f, hit, slow_taps(settings, &f, hit));
             if (known.luxel < LX_SILENT && !known.is_near) {
                 result = find_slow_row(b, settings, &f, known.luxel, out, error);
                 if (result != LX_OK) return result;

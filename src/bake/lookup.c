@@ -108,5 +108,5 @@ void lx_lookup_release(lx_lookup *lookup)
 void lx_lookup_silence(lx_lookup *lookup, const lx_luxel_map *map, const uint8_t *answers)
 {
     for (uint32_t i = 0; i < map->count; ++i)
-        if (!answers[i]) lookup->places[map->texel[i]].luxel = map->valid[i] ? i | LX_SILENT : LX_NO_LUXEL;
+        if (!answers[i]) lookup->places[map->texel[i]].luxel = i | LX_SILENT;
 }

@@ -81,7 +81,7 @@ static inline void lx_lookup_fetch(const lx_lookup *lookup, lx_taps taps)
 #endif
 }
 
-/// Luxels whose `answers` is false fall silent, invalid ones are no longer there.
+/// Luxels whose `answers` is false fall silent.
 void lx_lookup_silence(lx_lookup *lookup, const lx_luxel_map *map, const uint8_t *answers);
 
 #endif

@@ -158,17 +158,24 @@ static lx_vec3 lift(const lx_tracer *tracer, const lx_piece *piece, lx_vec2 b, l
     return lx_mad(position, shift, hit.surface == LX_MISS ? 1.0f : 0.5f * hit.t);
 }
 
+// As lx_normal_at has it, from vertex normals that are at hand.
+static lx_vec3 smooth_normal(const lx_piece *piece, lx_vec2 b)
+{
+    const lx_vec3 sum = lx_add(lx_add(lx_scale(piece->vertex_normal[0], 1 - b.x - b.y), lx_scale(piece->vertex_normal[1], b.x)), lx_scale(piece->vertex_normal[2], b.y));
+    const lx_vec3 n = lx_normalize_or(sum, piece->normal);
+    return lx_dot(n, piece->normal) > 0 ? n : piece->normal;
+}
+
 const lx_piece *lx_texel_site(lx_texel *t, uint32_t number, lx_receiver *out)
 {
     const lx_vec2 u = lx_sobol_pair(number, lx_hash_combine(t->stream, 0x51e1u));
     lx_vec2 b;
     const lx_piece *piece = choose(t, u, &b);
-    const lx_fragment *f = &t->fragments[piece->fragment];
     out->position = blend(piece, b);
     out->geometric_normal = piece->normal;
     out->normal = piece->shading_normal;
     if (piece->smooth) {
-        out->normal = lx_normal_at(t->bake->tracer, f->surface, f->triangle, b.x, b.y, piece->normal);
+        out->normal = smooth_normal(piece, b);
         out->position = lift(t->bake->tracer, piece, b, out->position);
     }
     return piece;

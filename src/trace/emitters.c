@@ -281,12 +281,12 @@ static uint32_t find_step(const float *cdf, uint32_t low, uint32_t count, float 
 }
 
 // A triangle of a source for a viewer, and how probable it was; u becomes its place within the choice.
-static const lx_emitter_triangle *choose_triangle(const lx_emitters *emitters, uint32_t source, const lx_light_table *table, lx_vec3 viewer, float *u,
-                                                  float *probability)
+static const lx_emitter_triangle *choose_triangle(const lx_emitters *emitters, uint32_t source, const lx_light_table *table, bool by_power, lx_vec3 viewer,
+                                                  float *u, float *probability)
 {
     uint32_t index;
     if (table) return lx_light_table_sample(table, &emitters->tree, viewer, u, &index, probability) ? &emitters->triangles[index] : NULL;
-    if (lx_emitters_has_tree(emitters, source))
+    if (!by_power && lx_emitters_has_tree(emitters, source))
         return lx_light_tree_sample(&emitters->tree, emitters->roots[source].root, viewer, u, &index, probability) ? &emitters->triangles[index] : NULL;
     const uint32_t first = emitters->first_triangle[source], count = emitters->first_triangle[source + 1] - first;
     const float *cdf = emitters->triangle_cdf + first + source;
@@ -329,10 +329,11 @@ static float angle_per_area(const lx_emitter_triangle *t, lx_vec3 viewer, float 
     return distance2 > 0 ? fabsf(lx_dot(t->normal, to_point)) / (distance2 * sqrtf(distance2)) : 0;
 }
 
-bool lx_emitters_sample(const lx_emitters *emitters, uint32_t source, const lx_light_table *table, lx_vec3 viewer, lx_vec2 u, lx_emitter_sample *out)
+bool lx_emitters_sample(const lx_emitters *emitters, uint32_t source, const lx_light_table *table, bool by_power, lx_vec3 viewer, lx_vec2 u,
+                        lx_emitter_sample *out)
 {
     float probability;
-    const lx_emitter_triangle *t = choose_triangle(emitters, source, table, viewer, &u.x, &probability);
+    const lx_emitter_triangle *t = choose_triangle(emitters, source, table, by_power, viewer, &u.x, &probability);
     if (!t) return false;
     *out = (lx_emitter_sample){.triangle = t, .pdf_area = probability / t->area};
     lx_spherical_triangle seen;

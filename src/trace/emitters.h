@@ -43,10 +43,11 @@ struct lx_tracer;
 lx_result lx_emitters_build(struct lx_tracer *tracer, lx_error *error);
 void lx_emitters_release(lx_emitters *emitters);
 
-/// Chooses a point of a source, for what lies at `viewer`, by a table of its tree if there is one. False if the source has nothing bright, or nothing
-/// that faces there.
-bool lx_emitters_sample(const lx_emitters *emitters, uint32_t source, const lx_light_table *table, lx_vec3 viewer, lx_vec2 u, lx_emitter_sample *out);
-/// The density with which lx_emitters_sample chooses that point without a table. `index` is the emitter triangle's number.
+/// Chooses a point of a source, for what lies at `viewer`, by a table of its tree if there is one; `by_power`: whatever lies at `viewer`. False if the source has nothing
+/// bright, or nothing that faces there.
+bool lx_emitters_sample(const lx_emitters *emitters, uint32_t source, const lx_light_table *table, bool by_power, lx_vec3 viewer, lx_vec2 u,
+                        lx_emitter_sample *out);
+/// The density with which lx_emitters_sample chooses that point without a table and not by power alone. `index` is the emitter triangle's number.
 float lx_emitters_pdf_area(const lx_emitters *emitters, uint32_t source, uint32_t index, lx_vec3 viewer, float u, float v);
 
 /// Is a point chosen by a tree, rather than by power alone?

@@ -173,14 +173,15 @@ static bool has_samples_alone(const lx_tracer *tracer, uint32_t source, lx_vec3 
     return lx_light_tree_sum(&tracer->emitters.tree, &tracer->emitters.roots[source], origin) * s->power < small_solid_angle;
 }
 
-static bool sample_emissive(const lx_tracer *tracer, uint32_t source, const lx_source_view *view, const lx_receiver *r, lx_vec2 u, uint32_t count,
+static bool sample_emissive(const lx_tracer *tracer, uint32_t source, const lx_source_view *view, bool by_power, const lx_receiver *r, lx_vec2 u, uint32_t count,
                             lx_ray *ray, lx_rgb *irradiance, uint32_t *cell)
 {
     // Seen from where rays start, so that hits are weighed by the same densities.
     const lx_vec3 origin = ray_origin(r);
     const bool alone = view ? view->alone[r - view->receivers] : has_samples_alone(tracer, source, origin);
     lx_emitter_sample s;
-    if (!lx_emitters_sample(&tracer->emitters, source, view && alone && !view->table.rough ? &view->table : NULL, origin, u, &s)) return false;
+    const lx_light_table *table = view && alone && !view->table.rough ? &view->table : NULL;
+    if (!lx_emitters_sample(&tracer->emitters, source, table, by_power && alone, origin, u, &s)) return false;
     const lx_emitter_triangle *t = s.triangle;
     const lx_vec3 point = lx_mad(lx_mad(t->origin, t->edge1, s.u), t->edge2, s.v);
     const lx_vec3 to_point = lx_sub(point, origin);
@@ -258,13 +259,13 @@ bool lx_sample_uniform_sky(const lx_tracer *tracer, const lx_receiver *receiver,
     return true;
 }
 
-static bool sample_source(const lx_tracer *tracer, uint32_t source, const lx_source_view *view, const lx_receiver *receiver, lx_vec2 u, uint32_t count,
-                          lx_ray *out_ray, lx_rgb *out_irradiance, uint32_t *out_cell)
+static bool sample_source(const lx_tracer *tracer, uint32_t source, const lx_source_view *view, bool by_power, const lx_receiver *receiver, lx_vec2 u,
+                          uint32_t count, lx_ray *out_ray, lx_rgb *out_irradiance, uint32_t *out_cell)
 {
     *out_cell = 0;
     const lx_source *s = lx_tracer_source(tracer, source);
     if (s->kind == LX_SOURCE_SKY) return sample_sky(tracer, receiver, u, count, out_ray, out_irradiance);
-    if (s->kind == LX_SOURCE_EMISSIVE) return sample_emissive(tracer, source, view, receiver, u, count, out_ray, out_irradiance, out_cell);
+    if (s->kind == LX_SOURCE_EMISSIVE) return sample_emissive(tracer, source, view, by_power, receiver, u, count, out_ray, out_irradiance, out_cell);
     const lx_light *light = &tracer->scene->lights[s->light];
     float irradiance = 0;
     bool arrives = false;
@@ -282,7 +283,13 @@ static bool sample_source(const lx_tracer *tracer, uint32_t source, const lx_sou
 bool lx_sample_source(const lx_tracer *tracer, uint32_t source, const lx_receiver *receiver, lx_vec2 u, uint32_t count, lx_ray *out_ray,
                       lx_rgb *out_irradiance, uint32_t *out_cell)
 {
-    return sample_source(tracer, source, NULL, receiver, u, count, out_ray, out_irradiance, out_cell);
+    return sample_source(tracer, source, NULL, false, receiver, u, count, out_ray, out_irradiance, out_cell);
+}
+
+bool lx_sample_source_by_power(const lx_tracer *tracer, uint32_t source, const lx_receiver *receiver, lx_vec2 u, uint32_t count, lx_ray *out_ray,
+                               lx_rgb *out_irradiance, uint32_t *out_cell)
+{
+    return sample_source(tracer, source, NULL, true, receiver, u, count, out_ray, out_irradiance, out_cell);
 }
 
 static lx_light_view view_of(const lx_receiver *receivers, uint32_t count)
@@ -331,7 +338,7 @@ void lx_source_view_fill(lx_source_view *view, const lx_tracer *tracer, uint32_t
 bool lx_source_view_sample(const lx_source_view *view, uint32_t receiver, lx_vec2 u, uint32_t count, lx_ray *out_ray, lx_rgb *out_irradiance,
                            uint32_t *out_cell)
 {
-    return !view->dark && sample_source(view->tracer, view->source, view->has_table ? view : NULL, &view->receivers[receiver], u, count, out_ray,
+    return !view->dark && sample_source(view->tracer, view->source, view->has_table ? view : NULL, false, &view->receivers[receiver], u, count, out_ray,
                                         out_irradiance, out_cell);
 }
 

@@ -14,6 +14,11 @@
 bool lx_sample_source(const lx_tracer *tracer, uint32_t source, const lx_receiver *receiver, lx_vec2 u, uint32_t count, lx_ray *out_ray,
                       lx_rgb *out_irradiance, uint32_t *out_cell);
 
+/// The same estimate, cheaper and noisier: where samples bring all light of an emissive source, its triangles are chosen by their power, wherever they face. For
+/// receivers that count little.
+bool lx_sample_source_by_power(const lx_tracer *tracer, uint32_t source, const lx_receiver *receiver, lx_vec2 u, uint32_t count, lx_ray *out_ray,
+                               lx_rgb *out_irradiance, uint32_t *out_cell);
+
 /// One cosine-weighted sample of a uniform sky, else as lx_sample_source; its density is that of gather rays, so the weight is the same for all directions.
 bool lx_sample_uniform_sky(const lx_tracer *tracer, const lx_receiver *receiver, lx_vec2 u, uint32_t count, lx_ray *out_ray, lx_rgb *out_irradiance);
 /// Weight of a cosine-weighted ray that met a uniform sky, against `count` samples of lx_sample_uniform_sky; 1 without any.

@@ -199,6 +199,37 @@ static void samples_and_rays_share_all_light_of_a_uniform_sky(void **state)
     end(&f);
 }
 
+// Samples by power bring what samples by the tree bring, seen from near, where hits have a share, and from far, where they have none.
+static void samples_by_power_bring_the_same_light(void **state)
+{
+    (void)state;
+    fixture f;
+    begin(&f, 1);
+    const uint32_t source = source_number(&f, "swarm");
+    static const lx_receiver receivers[] = {{.position = {0.2f, 1.95f, 0}, .normal = {0, 1, 0}, .geometric_normal = {0, 1, 0}},
+                                            {.position = {0.5f, 0.2f, 0.3f}, .normal = {0, 1, 0}, .geometric_normal = {0, 1, 0}}};
+    for (int r = 0; r < 2; ++r) {
+        double sums[2] = {0}, squares[2] = {0};
+        for (uint32_t i = 0; i < brute_samples; ++i) {
+            const uint32_t bits = lx_hash_combine(0x70e5, i);
+            const lx_vec2 u = {lx_unit_float(bits), lx_unit_float(lx_hash32(bits + 77))};
+            for (int by_power = 0; by_power < 2; ++by_power) {
+                lx_ray ray;
+                lx_rgb light;
+                uint32_t cell;
+                const bool arrives = (by_power ? lx_sample_source_by_power : lx_sample_source)(f.tracer, source, &receivers[r], u, 1, &ray, &light, &cell);
+                const double value = arrives ? (double)light.g : 0;
+                sums[by_power] += value / brute_samples;
+                squares[by_power] += value * value / brute_samples;
+            }
+        }
+        const double variance = squares[0] - sums[0] * sums[0] + squares[1] - sums[1] * sums[1];
+        assert_true(sums[0] > 0);
+        assert_near(sums[1], sums[0], 4 * sqrt(variance / brute_samples) + 1e-6);
+    }
+    end(&f);
+}
+
 // At later vertices of a path the ray that goes on has it all.
 static void paths_take_no_samples_of_a_uniform_sky(void **state)
 {
@@ -334,6 +365,7 @@ int main(void)
         cmocka_unit_test(emissive_meshes_give_what_brute_force_does),
         cmocka_unit_test(cells_of_monitors_give_what_brute_force_does),
         cmocka_unit_test(uniform_skies_give_what_brute_force_does),
+        cmocka_unit_test(samples_by_power_bring_the_same_light),
         cmocka_unit_test(samples_and_rays_share_all_light_of_a_uniform_sky),
         cmocka_unit_test(paths_take_no_samples_of_a_uniform_sky),
         cmocka_unit_test(a_sliver_of_sky_is_not_lost),
