@@ -133,15 +133,17 @@ static lx_result settle_tile(void *user, size_t task, uint32_t worker, lx_error 
     lx_luxel_page *page = &job->pages[tile->page];
     const lx_result result = lx_luxels_settle(job->bake, page, tile->x, tile->y, error);
     if (result != LX_OK) return result;
+    lx_texel t = {0};
     for (uint32_t i = tile->first; i < tile->first + tile->count; ++i) {
         enum { sites = 4 };
         uint32_t texel;
         lx_job_page(job, i, &texel);
-        job->map.size_m[i] = lx_luxel_size(job->bake, page, texel);
+        lx_texel_open(&t, job->bake, page, texel);
+        job->map.size_m[i] = lx_texel_size(&t);
         job->map.valid[i] = lx_luxel_is_valid(page, texel);
         if (!job->map.valid[i]) continue;
         lx_receiver r[sites];
-        lx_luxel_sites(job->bake, page, texel, 0, sites, r);
+        lx_luxel_sites(&t, job->bake, page, texel, 0, sites, r);
         lx_vec3 position = {0, 0, 0}, normal = {0, 0, 0};
         for (int k = 0; k < sites; ++k) {
             position = lx_mad(position, r[k].position, 1.0f / sites);
@@ -211,11 +213,12 @@ static lx_result check_sum_of_layers(const lx_bake_job *job, lx_error *error)
         last_page = tile->page;
         const uint32_t wanted = tile->count < points_per_page ? tile->count : points_per_page;
         uint32_t count = 0;
+        lx_texel t = {0};
         for (uint32_t k = 0; k < wanted; ++k) {
             const uint32_t luxel = tile->first + k * tile->count / wanted;
             uint32_t texel;
             const lx_luxel_page *page = lx_job_page(job, luxel, &texel);
-            if (job->map.valid[luxel]) lx_luxel_sites(job->bake, page, texel, 0, 1, &points[count++]);
+            if (job->map.valid[luxel]) lx_luxel_sites(&t, job->bake, page, texel, 0, 1, &points[count++]);
         }
         lx_layers_check(job->bake, batch, points, count);
     }

@@ -38,28 +38,26 @@ static lx_rgb mean_albedo(const lx_gather_job *g, lx_texel *t)
 }
 
 // What near hits on the luxel will take of it.
-static lx_gather_luxel describe(const lx_gather_job *g, uint32_t luxel, const lx_receiver *first_site)
+static lx_gather_luxel describe(const lx_gather_job *g, lx_texel *t, uint32_t luxel, const lx_receiver *first_site)
 {
     uint32_t texel;
     const lx_luxel_page *page = lx_job_page(g->job, luxel, &texel);
-    lx_texel t;
-    lx_texel_open(&t, g->bake, page, texel);
-    lx_gather_luxel out = {.albedo = mean_albedo(g, &t), .centre = first_site->position, .reach = near_source_texels * lx_texel_piece(&t, 0)->texel_m};
+    lx_texel_open(t, g->bake, page, texel);
+    lx_gather_luxel out = {.albedo = mean_albedo(g, t), .centre = first_site->position, .reach = near_source_texels * lx_texel_size(t)};
     for (uint32_t s = 0; s < g->bake->source_count; ++s)
         if (g->uses[s].layer >= 0 && lx_gather_is_near(g->bake->tracer, &out, s)) out.near_sources |= (uint64_t)1 << s % 64;
     return out;
 }
 
 // Paths that meet an invalid luxel ask it for its albedo alone.
-static void describe_invalid(const lx_gather_job *g, const lx_luxel_tile *tile)
+static void describe_invalid(const lx_gather_job *g, lx_texel *t, const lx_luxel_tile *tile)
 {
     for (uint32_t i = tile->first; i < tile->first + tile->count; ++i) {
         if (g->job->map.valid[i]) continue;
         uint32_t texel;
         const lx_luxel_page *page = lx_job_page(g->job, i, &texel);
-        lx_texel t;
-        lx_texel_open(&t, g->bake, page, texel);
-        g->luxels[i] = (lx_gather_luxel){.albedo = mean_albedo(g, &t)};
+        lx_texel_open(t, g->bake, page, texel);
+        g->luxels[i] = (lx_gather_luxel){.albedo = mean_albedo(g, t)};
     }
 }
 
@@ -240,8 +238,8 @@ static lx_result light_tile(void *user, size_t task, uint32_t worker, lx_error *
     memset(s->alone, 0, s->count);
     memset(s->sky_light, 0, s->count * sizeof *s->sky_light);
     const bool bounces = g->settings.bounces > 0;
-    for (uint32_t i = 0; bounces && i < s->count; ++i) g->luxels[s->luxel[i]] = describe(g, s->luxel[i], &s->sites[(size_t)i * lx_site_count]);
-    if (bounces) describe_invalid(g, tile);
+    for (uint32_t i = 0; bounces && i < s->count; ++i) g->luxels[s->luxel[i]] = describe(g, &s->texel, s->luxel[i], &s->sites[(size_t)i * lx_site_count]);
+    if (bounces) describe_invalid(g, &s->texel, tile);
     if (bounces || g->interpolates || g->samples_sky) { // direct light must know as well
         memset(s->met, 0, row_values * sizeof *s->met);
         memset(s->near_light, 0, row_values * sizeof *s->near_light);

@@ -26,9 +26,9 @@ void lx_gather_list_luxels(const lx_gather_job *g, const lx_luxel_tile *tile, bo
     }
 }
 
-void lx_gather_place_sites(const lx_gather_job *g, const lx_gather_scratch *s, uint32_t index, uint32_t first, uint32_t count, lx_receiver *out)
+void lx_gather_place_sites(const lx_gather_job *g, lx_gather_scratch *s, uint32_t index, uint32_t first, uint32_t count, lx_receiver *out)
 {
     uint32_t texel;
     const lx_luxel_page *page = lx_job_page(g->job, s->luxel[index], &texel);
-    lx_luxel_sites(g->bake, page, texel, first, count, out);
+    lx_luxel_sites(&s->texel, g->bake, page, texel, first, count, out);
 }

@@ -4,6 +4,7 @@
 
 #include "bake/bake_job.h"
 #include "bake/gather_rays.h"
+#include "bake/texel_sites.h"
 #include "trace/direct.h"
 
 enum {
@@ -19,6 +20,7 @@ static const float lx_gather_darkest = 0.01f; ///< Of a layer's mean: below it e
 typedef struct lx_gather_scratch {
     lx_gather_batch *batch;
     lx_direct_batch *direct;
+    lx_texel texel;         // the one seen last
     lx_receiver *sites;     // [lx_gather_tile_luxels][lx_site_count]
     lx_gather_start *starts; // [lx_gather_chunk_luxels × rays of a round at most]
     float *sums;            // [2][lx_gather_chunk_luxels][3][row_layers], or [lx_gather_tile_luxels][3][row_layers]
@@ -113,7 +115,7 @@ bool lx_report_part(void *user, const lx_progress *progress);
 /// Valid luxels of a tile, or those of them that send gather rays.
 void lx_gather_list_luxels(const lx_gather_job *g, const lx_luxel_tile *tile, bool senders, lx_gather_scratch *s);
 /// Some of the sites of a listed luxel.
-void lx_gather_place_sites(const lx_gather_job *g, const lx_gather_scratch *s, uint32_t index, uint32_t first, uint32_t count, lx_receiver *out);
+void lx_gather_place_sites(const lx_gather_job *g, lx_gather_scratch *s, uint32_t index, uint32_t first, uint32_t count, lx_receiver *out);
 
 /// Direct light and the irradiance cache's rays; then its passes, one a bounce beyond the first: gather_cache.c.
 lx_result lx_gather_light(lx_gather_job *g, lx_error *error);

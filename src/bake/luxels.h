@@ -66,8 +66,4 @@ bool lx_luxel_is_whole(const lx_bake *bake, const lx_luxel_page *page, uint32_t 
 /// Key of a texel's random streams, from the seed, its page and its number there.
 uint32_t lx_luxel_stream(const lx_bake *bake, const lx_luxel_page *page, uint32_t texel);
 
-/// Sites first … first + count - 1 of a valid texel of a settled block, first + count <= lx_site_count: positions on the surface, lifted off it where smooth
-/// shading asks for it. Every site counts the same. A site does not depend on which others are asked for.
-void lx_luxel_sites(const lx_bake *bake, const lx_luxel_page *page, uint32_t texel, uint32_t first, uint32_t count, lx_receiver *out);
-
 #endif

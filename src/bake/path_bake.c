@@ -1,5 +1,6 @@
 // The referee: every luxel by paths of its own, tile by tile.
 #include "bake/bake_job.h"
+#include "bake/texel_sites.h"
 
 #include "base/error.h"
 
@@ -11,6 +12,7 @@ enum { tile_luxels = lx_luxel_tile_edge * lx_luxel_tile_edge };
 typedef struct tile_scratch {
     lx_path_batch *batch;
     double *sums;         // [luxel of the tile][layer][channel]
+    lx_texel texel;       // the one seen last
     lx_receiver sites[lx_site_count];
     lx_path_start starts[lx_path_batch_size];
     lx_rgb layer[tile_luxels]; // one layer on its way out
@@ -33,7 +35,7 @@ static void trace_luxels(const path_job *p, const lx_luxel_tile *tile, tile_scra
         uint32_t texel;
         const lx_luxel_page *page = lx_job_page(p->job, tile->first + i, &texel);
         if (!p->job->map.valid[tile->first + i]) continue;
-        lx_luxel_sites(bake, page, texel, 0, sites, s->sites);
+        lx_luxel_sites(&s->texel, bake, page, texel, 0, sites, s->sites);
         const uint32_t stream = lx_luxel_stream(bake, page, texel);
         for (uint32_t sample = 0; sample < samples; ++sample) {
             const uint32_t site = (uint32_t)((uint64_t)sample * sites / samples);

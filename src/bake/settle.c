@@ -396,6 +396,7 @@ lx_result lx_luxels_settle(const lx_bake *bake, lx_luxel_page *page, uint32_t x,
     const uint32_t size = bake->atlas->page_size, edge = (size + lx_site_block - 1) / lx_site_block;
     lx_settled *list = NULL;
     size_t count = 0, capacity = 0;
+    lx_texel t = {0};
     for (uint32_t row = y; row < y + lx_site_block && row < size; ++row)
         for (uint32_t column = x; column < x + lx_site_block && column < size; ++column) {
             const uint32_t texel = row * size + column;
@@ -404,7 +405,6 @@ lx_result lx_luxels_settle(const lx_bake *bake, lx_luxel_page *page, uint32_t x,
                 lx_free(list);
                 return lx_fail_memory(error, "luxels");
             }
-            lx_texel t;
             lx_texel_open(&t, bake, page, texel);
             const uint32_t state = settle_texel(&t, &list[count]);
             page->state[texel] = (uint16_t)(state == 0 ? count++ : state);

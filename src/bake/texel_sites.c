@@ -25,7 +25,10 @@ void lx_texel_open(lx_texel *t, const lx_bake *bake, const lx_luxel_page *page, 
     t->stream = lx_luxel_stream(bake, page, texel);
     t->area = 0;
     for (uint32_t i = 0; i < t->fragment_count; ++i) t->area += t->fragments[i].area;
-    for (uint32_t i = 0; i < lx_piece_slots; ++i) t->pieces[i].fragment = UINT32_MAX;
+    for (uint32_t i = 0; i < lx_piece_slots; ++i) {
+        t->pieces[i].fragment = UINT32_MAX;
+        t->pieces[i].clipped = false;
+    }
 }
 
 static bool are_equal(const lx_vec3 v[3])
@@ -33,17 +36,13 @@ static bool are_equal(const lx_vec3 v[3])
     return memcmp(&v[0], &v[1], sizeof v[0]) == 0 && memcmp(&v[0], &v[2], sizeof v[0]) == 0;
 }
 
-const lx_piece *lx_texel_piece(lx_texel *t, uint32_t fragment)
+static void make_piece(const lx_bake *bake, const lx_fragment *f, lx_piece *piece)
 {
-    lx_piece *piece = &t->pieces[fragment % lx_piece_slots];
-    if (piece->fragment == fragment) return piece;
-    const lx_fragment *f = &t->fragments[fragment];
-    const lx_tracer *tracer = t->bake->tracer;
-    const lx_surface *surface = &t->bake->scene->surfaces[f->surface];
-    piece->fragment = fragment;
-    lx_triangle_on_page(t->bake->atlas, surface->instance, surface->primitive, f->triangle, piece->corner);
+    const lx_tracer *tracer = bake->tracer;
+    const lx_surface *surface = &bake->scene->surfaces[f->surface];
+    *piece = (lx_piece){.known = true, .surface = f->surface, .triangle = f->triangle};
+    lx_triangle_on_page(bake->atlas, surface->instance, surface->primitive, f->triangle, piece->corner);
     piece->whole = lx_cross_of(piece->corner[0], piece->corner[1], piece->corner[2]);
-    piece->clipped = false;
     lx_triangle_corners(tracer, f->surface, f->triangle, piece->world);
     piece->normal = lx_triangle_normal(tracer, f->surface, piece->world);
     piece->smooth = lx_triangle_normals(tracer, f->surface, f->triangle, piece->vertex_normal);
@@ -54,6 +53,23 @@ const lx_piece *lx_texel_piece(lx_texel *t, uint32_t fragment)
     }
     const lx_vec3 cross = lx_cross(lx_sub(piece->world[1], piece->world[0]), lx_sub(piece->world[2], piece->world[0]));
     piece->texel_m = (float)sqrt((double)lx_length(cross) / fabs(piece->whole));
+}
+
+const lx_piece *lx_texel_piece(lx_texel *t, uint32_t fragment)
+{
+    lx_piece *piece = &t->pieces[fragment % lx_piece_slots];
+    if (piece->fragment == fragment) return piece;
+    const lx_fragment *f = &t->fragments[fragment];
+    lx_piece *last = t->pieces; // the triangle's, when it was a part of another texel
+    while (last < t->pieces + lx_piece_slots && !(last->known && last->triangle == f->triangle && last->surface == f->surface)) ++last;
+    if (last == t->pieces + lx_piece_slots) {
+        make_piece(t->bake, f, piece);
+    } else if (last != piece) {
+        const lx_piece other = *piece;
+        *piece = *last;
+        *last = other;
+    }
+    piece->fragment = fragment;
     return piece;
 }
 
@@ -166,18 +182,22 @@ static lx_vec3 smooth_normal(const lx_piece *piece, lx_vec2 b)
     return lx_dot(n, piece->normal) > 0 ? n : piece->normal;
 }
 
-const lx_piece *lx_texel_site(lx_texel *t, uint32_t number, lx_receiver *out)
+// Where site `number` falls, on the flat triangle.
+static const lx_piece *place_site(lx_texel *t, uint32_t number, lx_receiver *out, lx_vec2 *out_b)
 {
     const lx_vec2 u = lx_sobol_pair(number, lx_hash_combine(t->stream, 0x51e1u));
-    lx_vec2 b;
-    const lx_piece *piece = choose(t, u, &b);
-    out->position = blend(piece, b);
+    const lx_piece *piece = choose(t, u, out_b);
+    out->position = blend(piece, *out_b);
     out->geometric_normal = piece->normal;
-    out->normal = piece->shading_normal;
-    if (piece->smooth) {
-        out->normal = smooth_normal(piece, b);
-        out->position = lift(t->bake->tracer, piece, b, out->position);
-    }
+    out->normal = piece->smooth ? smooth_normal(piece, *out_b) : piece->shading_normal;
+    return piece;
+}
+
+const lx_piece *lx_texel_site(lx_texel *t, uint32_t number, lx_receiver *out)
+{
+    lx_vec2 b;
+    const lx_piece *piece = place_site(t, number, out, &b);
+    if (piece->smooth) out->position = lift(t->bake->tracer, piece, b, out->position);
     return piece;
 }
 
@@ -195,22 +215,24 @@ bool lx_luxel_is_whole(const lx_bake *bake, const lx_luxel_page *page, uint32_t 
     return !settled || !settled->split;
 }
 
-void lx_luxel_sites(const lx_bake *bake, const lx_luxel_page *page, uint32_t texel, uint32_t first, uint32_t count, lx_receiver *out)
+void lx_luxel_sites(lx_texel *t, const lx_bake *bake, const lx_luxel_page *page, uint32_t texel, uint32_t first, uint32_t count, lx_receiver *out)
 {
-    lx_texel t;
-    lx_texel_open(&t, bake, page, texel);
+    lx_texel_open(t, bake, page, texel);
     const lx_settled *settled = settled_of(bake, page, texel);
-    for (uint32_t i = 0; i < count; ++i) {
-        lx_texel_site(&t, settled ? settled->number[first + i] : first + i, &out[i]);
-        if (settled) out[i].position = settled->position[first + i];
+    for (uint32_t i = first; i < first + count; ++i, ++out) {
+        lx_vec2 b;
+        if (!settled) {
+            lx_texel_site(t, i, out);
+            continue;
+        }
+        place_site(t, settled->number[i], out, &b);
+        out->position = settled->position[i];
     }
 }
 
-float lx_luxel_size(const lx_bake *bake, const lx_luxel_page *page, uint32_t texel)
+float lx_texel_size(lx_texel *t)
 {
-    lx_texel t;
-    lx_texel_open(&t, bake, page, texel);
-    return t.fragment_count > 0 ? lx_texel_piece(&t, 0)->texel_m : 0;
+    return t->fragment_count > 0 ? lx_texel_piece(t, 0)->texel_m : 0;
 }
 
 lx_vec2 lx_piece_barycentrics(const lx_piece *piece, lx_vec3 place)
