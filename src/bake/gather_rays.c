@@ -430,6 +430,11 @@ static flight first_flight(const lx_gather_start *start, float cosine)
                     .last_surface = LX_MISS, .from = LX_NO_LUXEL};
 }
 
+static void fetch_luxel(const lx_gather_settings *settings, uint32_t luxel)
+{
+    if (luxel != LX_NO_LUXEL && settings->rows_direct) __builtin_prefetch(&settings->luxels[luxel & ~LX_SILENT]);
+}
+
 static void fetch_triangle(const lx_lookup *lookup, const lx_hit *hit)
 {
     if (hit->surface == LX_MISS) return;
@@ -442,6 +447,7 @@ static size_t look_up(lx_gather_batch *b, const lx_gather_settings *settings, co
                       uint32_t first_start, const lx_gather_output *out)
 {
     pending pending_hits[block_size];
+    uint32_t luxels[block_size];
     size_t pending_count = 0;
     for (size_t i = first; i < end; ++i) {
         const lx_hit *hit = &b->hits[i];
@@ -466,9 +472,12 @@ static size_t look_up(lx_gather_batch *b, const lx_gather_settings *settings, co
         send(b, &b->rays[i], hit, &f);
     }
     for (size_t k = 0; k < pending_count; ++k) {
-        const uint32_t i = pending_hits[k].index;
+        luxels[k] = lx_lookup_luxel(settings->lookup, pending_hits[k].taps);
+        if (luxels[k] >= LX_SILENT || pending_hits[k].near) fetch_luxel(settings, luxels[k]);
+    }
+    for (size_t k = 0; k < pending_count; ++k) {
+        const uint32_t i = pending_hits[k].index, luxel = luxels[k];
         const lx_gather_start *start = &starts[b->found[i]];
-        const uint32_t luxel = lx_lookup_luxel(settings->lookup, pending_hits[k].taps);
         if (luxel >= LX_SILENT || pending_hits[k].near) {
             const flight f = first_flight(start, b->cosines[i]);
             if (!leave_unshaded(b, settings, &f, &b->hits[i], luxel)) send(b, &b->rays[i], &b->hits[i], &f);
