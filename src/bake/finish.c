@@ -1,5 +1,6 @@
 #include "bake/finish.h"
 
+#include "bake/interpolation.h"
 #include "bake/seams.h"
 #include "base/error.h"
 #include "post/denoise.h"
@@ -24,6 +25,8 @@ typedef struct layer_scratch {
 typedef struct layers_job {
     const lx_finish *finish;
     const lx_estimate *direct, *indirect;
+    const uint8_t *spacing;
+    float *share;           // [luxel] of indirect light, as lx_denoise_knots; NULL: nothing is denoised
     uint32_t first_layer;
     layer_scratch *scratch; // [worker]
 } layers_job;
@@ -113,16 +116,58 @@ uint64_t lx_finish_worker_bytes(const lx_finish *f)
     return bytes;
 }
 
+// ---- interpolated light -----------------------------------------------------------------------------------------------------
+
+// Calls back for every interpolated luxel: those of wide grids first, or last.
+static void visit_interpolated(const layers_job *j, bool wide_first, void (*visit)(void *to, uint32_t luxel, const lx_knots *knots), void *to)
+{
+    const lx_bake_map *map = &j->finish->job->map;
+    for (uint32_t k = 0; k < 2; ++k) {
+        const uint32_t spacing = (k == 0) == wide_first ? lx_wide_spacing : lx_narrow_spacing;
+        for (uint32_t t = 0; t < map->tile_count; ++t) {
+            const lx_luxel_tile *tile = &map->tiles[t];
+            lx_knots knots;
+            for (uint32_t i = tile->first; i < tile->first + tile->count; ++i)
+                if (j->spacing[i] == spacing && lx_find_knots(&map->view, tile, i, spacing, &knots)) visit(to, i, &knots);
+        }
+    }
+}
+
+static void hand_on_share(void *to, uint32_t luxel, const lx_knots *knots)
+{
+    float *share = to;
+    for (uint32_t k = 0; k < knots->count; ++k) share[knots->luxel[k]] += knots->weight[k] * share[luxel];
+    share[luxel] = 0;
+}
+
+static void find_shares(layers_job *j)
+{
+    for (uint32_t i = 0; i < j->finish->job->map.view.count; ++i) j->share[i] = 1;
+    visit_interpolated(j, false, hand_on_share, j->share); // luxels of fine grids may have knots that are interpolated themselves
+}
+
+static void interpolate_luxel(void *to, uint32_t luxel, const lx_knots *knots)
+{
+    lx_rgb *light = to, sum = {0, 0, 0};
+    for (uint32_t k = 0; k < knots->count; ++k) sum = lx_rgb_add(sum, lx_rgb_scale(light[knots->luxel[k]], knots->weight[k]));
+    light[luxel] = sum;
+}
+
+static void interpolate(void *user, lx_rgb *light) { visit_interpolated(user, true, interpolate_luxel, light); }
+
+// ---- layers -----------------------------------------------------------------------------------------------------------------
+
 static lx_result finish_layer(void *user, size_t task, uint32_t worker, lx_error *error)
 {
-    const layers_job *j = user;
+    layers_job *j = user;
     const lx_finish *f = j->finish;
     const layer_scratch *s = &j->scratch[worker];
     const lx_luxel_map *map = &f->job->map.view;
     const lx_estimate *direct = j->direct + task * map->count, *indirect = j->indirect + task * map->count;
     if (f->graph) {
-        lx_denoise_layer(f->graph, lx_light_direct, direct, s->denoise, s->light);
-        lx_denoise_layer(f->graph, lx_light_indirect, indirect, s->denoise, s->indirect);
+        const lx_denoise_knots knots = {.share = j->share, .interpolate = interpolate, .user = j};
+        lx_denoise_layer(f->graph, lx_light_direct, direct, NULL, s->denoise, s->light);
+        lx_denoise_layer(f->graph, lx_light_indirect, indirect, &knots, s->denoise, s->indirect);
         for (uint32_t i = 0; i < map->count; ++i) s->light[i] = lx_rgb_add(s->light[i], s->indirect[i]);
     } else {
         for (uint32_t i = 0; i < map->count; ++i) s->light[i] = lx_rgb_add(direct[i].mean, indirect[i].mean);
@@ -135,15 +180,23 @@ static lx_result finish_layer(void *user, size_t task, uint32_t worker, lx_error
     return lx_finished_write(f->job->bake->finished, j->first_layer + (uint32_t)task, 0, f->entry_count, s->light, error);
 }
 
-lx_result lx_finish_layers(lx_finish *f, const lx_estimate *direct, const lx_estimate *indirect, uint32_t first_layer, uint32_t layer_count,
-                           lx_error *error)
+lx_result lx_finish_layers(lx_finish *f, const lx_estimate *direct, const lx_estimate *indirect, const uint8_t *spacing, uint32_t first_layer,
+                           uint32_t layer_count, lx_error *error)
 {
     lx_result result = LX_OK;
     lx_pool *pool = f->job->bake->scene->context->pool;
     const uint32_t workers = lx_pool_worker_count(pool), luxels = f->job->map.view.count;
-    layers_job j = {.finish = f, .direct = direct, .indirect = indirect, .first_layer = first_layer};
+    layers_job j = {.finish = f, .direct = direct, .indirect = indirect, .spacing = spacing, .first_layer = first_layer};
     j.scratch = lx_calloc_array(workers, sizeof *j.scratch);
     if (!j.scratch) return lx_fail_memory(error, "layers");
+    if (f->graph) {
+        j.share = lx_malloc_array(luxels, sizeof *j.share);
+        if (!j.share) {
+            result = lx_fail_memory(error, "denoising");
+            goto cleanup;
+        }
+        find_shares(&j);
+    }
     for (uint32_t i = 0; i < workers; ++i) {
         layer_scratch *s = &j.scratch[i];
         s->light = lx_malloc_array(f->entry_count, sizeof *s->light);
@@ -162,5 +215,6 @@ cleanup:
         for (size_t k = 0; k < sizeof arrays / sizeof *arrays; ++k) lx_free(arrays[k]);
     }
     lx_free(j.scratch);
+    lx_free(j.share);
     return result;
 }

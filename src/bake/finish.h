@@ -1,7 +1,7 @@
 /// From estimates to finished layers: denoise, add direct to indirect light, make both sides of seams agree, hand over.
 ///
-///     lx_finish_open(&job, &finish, error);                                   // once luxels are placed and pages dilated
-///     lx_finish_layers(finish, direct, indirect, first, count, error);        // each group of layers
+///     lx_finish_open(&job, &finish, error);                                     // once luxels are placed and pages dilated
+///     lx_finish_layers(finish, direct, indirect, spacing, first, count, error); // each group of layers
 ///     lx_finish_close(finish);
 #ifndef LX_BAKE_FINISH_H
 #define LX_BAKE_FINISH_H
@@ -17,8 +17,8 @@ void lx_finish_close(lx_finish *finish);
 uint64_t lx_finish_worker_bytes(const lx_finish *finish);
 
 /// Estimates of `layer_count` layers from number `first_layer` on, [layer][luxel], direct and indirect light apart: what is noisy in one may be sharp in
-/// the other. Luxels that are not valid are black; dilation fills them.
-lx_result lx_finish_layers(lx_finish *finish, const lx_estimate *direct, const lx_estimate *indirect, uint32_t first_layer, uint32_t layer_count,
-                           lx_error *error);
+/// the other. Luxels that are not valid are black; dilation fills them. `spacing`: [luxel] of the knots between which indirect light is interpolated (bake/interpolation.h), 0 where it isn't.
+lx_result lx_finish_layers(lx_finish *finish, const lx_estimate *direct, const lx_estimate *indirect, const uint8_t *spacing, uint32_t first_layer,
+                           uint32_t layer_count, lx_error *error);
 
 #endif

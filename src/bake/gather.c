@@ -86,7 +86,7 @@ static void release_cache(lx_gather_job *g, uint32_t workers)
     }
     for (uint32_t t = 0; g->extras && t < g->job->map.tile_count; ++t) lx_free(g->extras[t].items);
     void **arrays[] = {(void **)&g->scratch, (void **)&g->extras, (void **)&g->luxels, (void **)&g->rows[0], (void **)&g->rows[1],
-                       (void **)&g->rows[2], (void **)&g->rows_direct, (void **)&g->hits, (void **)&g->met_estimates, (void **)&g->closeness, (void **)&g->spacing, (void **)&g->sky_weight};
+                       (void **)&g->rows[2], (void **)&g->rows_direct, (void **)&g->hits, (void **)&g->met_estimates, (void **)&g->closeness, (void **)&g->sky_weight};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) {
         lx_free(*arrays[i]);
         *arrays[i] = NULL;
@@ -100,7 +100,7 @@ static void release(lx_gather_job *g)
         lx_free(g->tiles[t].frozen);
     }
     void *arrays[] = {g->met, g->scales, g->authored, g->direct, g->indirect, g->pass_change, g->pass_energy, g->converged, g->tiles, g->layer_means,
-                      g->halvings, g->gain};
+                      g->halvings, g->gain, g->spacing};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) lx_free(arrays[i]);
 }
 
@@ -288,7 +288,7 @@ static lx_result bake_group(lx_bake_job *job, uint32_t first, uint32_t count, lx
     add_to_sums(&g);
     release_cache(&g, workers);
     lx_trim_memory();
-    LX_TRY(lx_finish_layers(finish, g.direct, g.indirect, first, count, error));
+    LX_TRY(lx_finish_layers(finish, g.direct, g.indirect, g.spacing, first, count, error));
     job->stages.denoise += lx_lap(&stage_start);
 cleanup:
     release_cache(&g, workers);

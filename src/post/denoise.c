@@ -8,6 +8,9 @@
 //    does not have in the candidate. That is all it takes: linear equations, as many as candidates.
 // 4. The same once more, with what came out as a pilot ([Dabov2007], "Image Denoising by Sparse 3-D Transform-Domain Collaborative Filtering", does so): what candidates do to
 //    the light is seen in the pilot, and what they do to the noise is known from their kernels, so that the equations are hardly noisy any more.
+//
+// Where light is interpolated between knots, all luxels are filtered, but only knots are mixed, by what kernels do to the noise of knots so far apart. What is between them
+// is interpolated again.
 #include "post/denoise_graph.h"
 
 #include "base/memory.h"
@@ -24,6 +27,7 @@ enum {
     most_products = most_candidates * (most_candidates + 1) / 2 + 1, // and a weight
     block_luxels = 1024,  // mixed at a time
     region_luxels = 3072, // what a block's pools reach; one luxel's reach 729
+    spacing_count = 3,    // knots are 1, 2 or 4 texels apart
 };
 
 enum { every_axis = -1 }; // else 0 or 2: the direction along it
@@ -52,8 +56,14 @@ typedef struct region {
     float products[2][region_luxels * most_products];
 } region;
 
+// Of unit noise, where no neighbour is missing: what a candidate has of a luxel's own, and covariances of what candidates differ from the input by.
+typedef struct unit_noise {
+    float own[most_candidates], covariance[most_candidates][most_candidates];
+} unit_noise;
+
 typedef struct work {
     const lx_denoise_graph *graph;
+    const lx_denoise_knots *knots; // NULL: every luxel is one
     uint32_t candidate_count;
     bool may_sharpen;            // weights below zero: kernels that keep curvature
     lx_rgb *candidates[most_candidates]; // [luxel]
@@ -62,12 +72,13 @@ typedef struct work {
     bool has_pilot;
     float *pilot;                // [luxel] mean of the channels
     float *filtered[most_candidates];     // [luxel] the pilot as the candidates are the input
-    // Of unit noise, where no neighbour is missing: what a candidate has of a luxel's own, and covariances of what candidates differ from the input by.
-    float own[most_candidates], covariance[most_candidates][most_candidates];
+    unit_noise noise[spacing_count];      // of knots 1, 2 and 4 texels apart and what is interpolated between them
     region *region;
 } work;
 
 static float mean_of(lx_rgb c) { return (c.r + c.g + c.b) * (1.0f / 3); }
+
+static float share_of(const work *w, uint32_t luxel) { return w->knots ? w->knots->share[luxel] : 1; }
 
 static const uint32_t *links_at(const lx_denoise_graph *graph, int level)
 {
@@ -79,9 +90,9 @@ size_t lx_denoise_scratch_bytes(const lx_denoise_graph *graph)
     return sizeof(region) + (size_t)graph->luxel_count * (most_candidates * (sizeof(lx_rgb) + sizeof(float)) + 2 * sizeof(float) + sizeof(uint32_t));
 }
 
-static work lay_out(const lx_denoise_graph *graph, lx_light_part part, void *scratch)
+static work lay_out(const lx_denoise_graph *graph, lx_light_part part, const lx_denoise_knots *knots, void *scratch)
 {
-    work w = {.graph = graph, .candidate_count = part == lx_light_direct ? most_candidates : level_count, .may_sharpen = part == lx_light_indirect, .mix_levels = pool_levels};
+    work w = {.graph = graph, .knots = knots, .candidate_count = part == lx_light_direct ? most_candidates : level_count, .may_sharpen = part == lx_light_indirect, .mix_levels = pool_levels};
     const size_t count = graph->luxel_count;
     w.region = scratch;
     lx_rgb *next = (lx_rgb *)(void *)(w.region + 1);
@@ -122,30 +133,32 @@ static void pool(const lx_denoise_graph *graph, int level, const uint32_t *list,
 
 // Variances of single luxels, from a few half buffers each, are mostly noise themselves. Means over the neighbourhood: of the variance, of its share of
 // the squared value, and of the value. Beside a bright spot the first is far too high for the dark, beside a dark spot the second for the
-// bright; the lower of what they say is not far from the truth in both.
+// bright; the lower of what they say is not far from the truth in both. Of knots alone: interpolating makes variances lower.
 typedef struct spread {
-    float absolute, relative, value;
+    float absolute, relative, value, weight;
 } spread;
 
 static void pool_variances(const work *w, const lx_estimate *in)
 {
     const uint32_t count = w->graph->luxel_count;
-    spread *a = (spread *)(void *)w->candidates[0], *b = (spread *)(void *)w->candidates[1];
+    spread *a = (spread *)(void *)w->candidates[0], *b = (spread *)(void *)w->candidates[2]; // four numbers: one array's place and a part of the next
     for (uint32_t i = 0; i < count; ++i) {
+        const bool is_knot = share_of(w, i) > 0;
         const float value = mean_of(in[i].mean), square = value * value;
-        a[i] = (spread){in[i].variance, square > 0 ? lx_min(1, in[i].variance / square) : 0, value};
+        a[i] = is_knot ? (spread){in[i].variance, square > 0 ? lx_min(1, in[i].variance / square) : 0, value, 1} : (spread){0, 0, 0, 0};
     }
     for (int level = 0; level < pool_levels; ++level) {
-        pool(w->graph, level, NULL, count, NULL, 3, &a->absolute, &b->absolute);
+        pool(w->graph, level, NULL, count, NULL, 4, &a->absolute, &b->absolute);
         spread *swap = a;
         a = b;
         b = swap;
     }
     for (uint32_t i = 0; i < count; ++i) {
+        const float unit = a[i].weight > 0 ? 1 / a[i].weight : 0, relative = unit * a[i].relative;
         // Where the noise is strong a single value says little about the light; the neighbourhood's does.
-        const float shared = a[i].relative * a[i].relative / (a[i].relative * a[i].relative + unsure * unsure);
-        const float value = (1 - shared) * mean_of(in[i].mean) + shared * a[i].value;
-        const float smooth = lx_min(a[i].absolute, contrast * a[i].relative * value * value);
+        const float shared = relative * relative / (relative * relative + unsure * unsure);
+        const float value = (1 - shared) * mean_of(in[i].mean) + shared * unit * a[i].value;
+        const float smooth = lx_min(unit * a[i].absolute, contrast * relative * value * value);
         float variance = lx_max(smooth, own_share * in[i].variance); // an outlier knows that it is one
         // What is below rounding is nothing.
         w->variances[i] = variance > lx_max(1e-12f * value * value, 1e-30f) ? variance : 0;
@@ -223,41 +236,70 @@ static void filter_pilot(work *w, const lx_rgb *pilot)
     w->has_pilot = true;
 }
 
-// Kernels are products of one along each axis, of [1 2 1] / 4 at the steps of all levels up to theirs.
-static void find_covariances(work *w)
+// Kernels are products of one along each axis, of [1 2 1] / 4 at the steps of all levels up to theirs. What a kernel has of a knot is what it has of the luxels around, each as far
+// as it is interpolated from the knot.
+static void find_unit_noise(work *w)
 {
     enum { middle = (1 << level_count) - 1, width = 2 * middle + 1 };
-    float line[level_count + 1][width] = {{0}}, inner[level_count + 1][level_count + 1]; // [levels]
+    float line[level_count + 1][width] = {{0}}; // [levels]
     line[0][middle] = 1;
     for (int n = 0; n < level_count; ++n)
         for (int i = 0; i < width; ++i) {
             const int step = 1 << n;
             line[n + 1][i] = 0.5f * line[n][i] + 0.25f * ((i >= step ? line[n][i - step] : 0) + (i + step < width ? line[n][i + step] : 0));
         }
-    for (int a = 0; a <= level_count; ++a)
-        for (int b = 0; b <= level_count; ++b) {
-            inner[a][b] = 0;
-            for (int i = 0; i < width; ++i) inner[a][b] += line[a][i] * line[b][i];
+    for (int s = 0; s < spacing_count; ++s) {
+        enum { most_reach = 1 << (spacing_count - 1), most_knots = width + 2 * most_reach };
+        const int spacing = 1 << s, first = middle % spacing - spacing; // beyond both ends there is a knot more
+        float of_knot[level_count + 1][most_knots] = {{0}}, inner[level_count + 1][level_count + 1] = {{0}}, own_line[level_count + 1];
+        int count = 0;
+        for (int knot = first; knot < width + spacing; knot += spacing, ++count)
+            for (int n = 0; n <= level_count; ++n) {
+                for (int i = 0; i < width; ++i) of_knot[n][count] += line[n][i] * lx_max(0, 1 - fabsf((float)(i - knot)) / (float)spacing);
+                if (knot == middle) own_line[n] = of_knot[n][count];
+            }
+        for (int a = 0; a <= level_count; ++a)
+            for (int b = 0; b <= level_count; ++b)
+                for (int i = 0; i < count; ++i) inner[a][b] += of_knot[a][i] * of_knot[b][i];
+        unit_noise *out = &w->noise[s];
+        int across[most_candidates], down[most_candidates];
+        for (int k = 0; k < most_candidates; ++k) {
+            const shape of = shape_of(k);
+            across[k] = of.axis == 2 ? 0 : of.level + 1;
+            down[k] = of.axis == 0 ? 0 : of.level + 1;
+            out->own[k] = own_line[across[k]] * own_line[down[k]];
+            for (int j = 0; j <= k; ++j)
+                out->covariance[k][j] = inner[across[k]][across[j]] * inner[down[k]][down[j]] - out->own[k] - out->own[j] + 1;
         }
-    int across[most_candidates], down[most_candidates];
-    for (int k = 0; k < most_candidates; ++k) {
-        const shape s = shape_of(k);
-        across[k] = s.axis == 2 ? 0 : s.level + 1;
-        down[k] = s.axis == 0 ? 0 : s.level + 1;
-        w->own[k] = line[across[k]][middle] * line[down[k]][middle];
-        for (int j = 0; j <= k; ++j)
-            w->covariance[k][j] = inner[across[k]][across[j]] * inner[down[k]][down[j]] - w->own[k] - w->own[j] + 1;
     }
 }
 
-// Weight that a luxel has itself in each candidate: no way leads back to it, since the steps of each level are longer than those before together.
-static void find_own_weights(const work *w, uint32_t luxel, float *own)
+// The like around a luxel that is in so many luxels' light: a knot among others 1, 2, 4 texels apart is in that of 1, 4, 16.
+static const unit_noise *noise_around(const work *w, uint32_t luxel, unit_noise *room)
 {
-    for (int k = 0; k < (int)w->candidate_count; ++k) {
-        const shape s = shape_of(k);
+    const float share = share_of(w, luxel);
+    if (share == 1) return &w->noise[0];
+    const bool is_wide = share > 4;
+    const unit_noise *a = &w->noise[is_wide], *b = a + 1;
+    const float t = is_wide ? lx_min((share - 4) / 12, 1) : (share - 1) / 3;
+    for (uint32_t k = 0; k < w->candidate_count; ++k) {
+        room->own[k] = a->own[k] + t * (b->own[k] - a->own[k]);
+        for (uint32_t j = 0; j <= k; ++j) room->covariance[k][j] = a->covariance[k][j] + t * (b->covariance[k][j] - a->covariance[k][j]);
+    }
+    return room;
+}
+
+// Weight that a luxel has itself in each candidate: no way leads back to it, since the steps of each level are longer than those before together.
+static void find_own_weights(const work *w, uint32_t luxel, const unit_noise *noise, float *own)
+{
+    const float *alone = w->noise[0].own;
+    float white[most_candidates]; // if neighbours' noise were not its own in part
+    for (uint32_t k = 0; k < w->candidate_count; ++k) {
+        const shape s = shape_of((int)k);
         float weights[direction_count];
-        own[k] = kernel_center / neighbour_weights(links_at(w->graph, s.level) + (size_t)luxel * direction_count, s.axis, weights);
-        if (s.before >= 0) own[k] *= own[s.before];
+        white[k] = kernel_center / neighbour_weights(links_at(w->graph, s.level) + (size_t)luxel * direction_count, s.axis, weights);
+        if (s.before >= 0) white[k] *= white[s.before];
+        own[k] = noise == &w->noise[0] ? white[k] : 1 - (1 - white[k]) * (1 - noise->own[k]) / (1 - alone[k]);
     }
 }
 
@@ -273,11 +315,13 @@ static void calm_variances(const work *w, const lx_rgb *input)
     const uint32_t *link = links_at(w->graph, 0);
     for (uint32_t i = 0; i < count; ++i, link += direction_count) {
         a[i] = (calm){0, 0};
-        if (!(w->variances[i] > 0)) continue;
+        if (!(w->variances[i] > 0) || share_of(w, i) == 0) continue;
         float weights[direction_count];
         const float scale = 1 / neighbour_weights(link, every_axis, weights);
         float expected = (1 - kernel_center * scale) * (1 - kernel_center * scale);
         for (int d = 0; d < direction_count; ++d) expected += weights[d] * weights[d] * scale * scale;
+        unit_noise room;
+        expected *= noise_around(w, i, &room)->covariance[0][0] / w->noise[0].covariance[0][0];
         if (!(expected > 0)) continue;
         const float difference = mean_of(w->candidates[0][i]) - mean_of(input[i]);
         a[i] = (calm){lx_min(difference * difference / (expected * w->variances[i]), most_difference), 1};
@@ -317,14 +361,14 @@ static void forget(region *r, uint32_t count)
     for (uint32_t i = 0; i < count; ++i) r->slot[r->list[i]] = LX_NO_LUXEL;
 }
 
-// Noisy luxels of first … end - 1 and all that their pools reach. Returns how many luxels that are; 0: none is noisy, or too many are reached (`*fits` tells).
+// Noisy knots of first … end - 1 and all that their pools reach. Returns how many luxels that are; 0: none is noisy, or too many are reached (`*fits` tells).
 static uint32_t collect(const work *w, uint32_t first, uint32_t end, bool *fits)
 {
     region *r = w->region;
     uint32_t count = 0;
     *fits = true;
     for (uint32_t i = first; i < end; ++i) {
-        if (!(w->variances[i] > 0)) continue;
+        if (!(w->variances[i] > 0) || share_of(w, i) == 0) continue;
         r->slot[i] = count;
         r->list[count++] = i;
     }
@@ -339,11 +383,11 @@ static uint32_t collect(const work *w, uint32_t first, uint32_t end, bool *fits)
 }
 
 // Products of the candidates' differences from the input, or of their likes from the pilot, in units of the input's variance, and the weight that they have: none where
-// nothing is noise.
+// nothing is noise, or none of the luxel's own.
 static void multiply(const work *w, const lx_estimate *in, uint32_t luxel, size_t size, float *out)
 {
     const float variance = w->variances[luxel];
-    if (!(variance > 0)) {
+    if (!(variance > 0) || share_of(w, luxel) == 0) {
         memset(out, 0, size * sizeof *out);
         return;
     }
@@ -381,7 +425,7 @@ static void solve(float a[most_candidates][most_candidates], uint32_t count, flo
 
 // Weights x of the candidates that have the least of 1 - 2 xᵀ(1 - own) + xᵀ C x: the squared error of input + Σ x (candidate - input) by [Blu2007], in units
 // of the input's variance. Unless they may sharpen: not below zero (negative ones are left out and the rest solved again), and together at most 1.
-static void find_weights(const work *w, const float *products, const float *own, float *x)
+static void find_weights(const work *w, const float *products, const unit_noise *noise, const float *own, float *x)
 {
     const uint32_t count = w->candidate_count;
     const float trust = (w->has_pilot ? pilot_trust : 1) / products[count * (count + 1) / 2];
@@ -395,8 +439,8 @@ static void find_weights(const work *w, const float *products, const float *own,
         for (uint32_t i = 0; i < used_count; ++i) {
             const uint32_t k = used[i];
             y[i] = 1 - own[k];
-            whole[i] = w->has_pilot ? sqrtf(y[i] / (1 - w->own[k])) : 0;
-            for (uint32_t j = 0; j <= i; ++j) a[i][j] = products[k * (k + 1) / 2 + used[j]] * trust + whole[i] * whole[j] * w->covariance[k][used[j]];
+            whole[i] = w->has_pilot ? sqrtf(y[i] / (1 - noise->own[k])) : 0;
+            for (uint32_t j = 0; j <= i; ++j) a[i][j] = products[k * (k + 1) / 2 + used[j]] * trust + whole[i] * whole[j] * noise->covariance[k][used[j]];
             a[i][i] = a[i][i] * (1 + ridges[w->has_pilot]) + ridges_of_noise[w->has_pilot];
         }
         solve(a, used_count, y);
@@ -426,7 +470,8 @@ static lx_rgb mix(const work *w, const lx_estimate *in, uint32_t luxel, const fl
     }
     sum = lx_rgb_add(sum, lx_rgb_scale(in[luxel].mean, left));
     lx_rgb low = in[luxel].mean, high = low;
-    const uint32_t *link = links_at(w->graph, 0) + (size_t)luxel * direction_count;
+    const float share = share_of(w, luxel);
+    const uint32_t *link = links_at(w->graph, share > 4 ? 2 : share > 1) + (size_t)luxel * direction_count; // to the next knots
     for (int d = 0; d < direction_count; ++d) { // the luxel itself where there is no neighbour
         const lx_rgb other = in[link[d] >> lx_denoise_weight_bits].mean;
         low = (lx_rgb){lx_min(low.r, other.r), lx_min(low.g, other.g), lx_min(low.b, other.b)};
@@ -458,8 +503,10 @@ static void mix_block(const work *w, const lx_estimate *in, uint32_t first, uint
     }
     for (uint32_t i = 0; i < r->end[0]; ++i) {
         float own[most_candidates], x[most_candidates];
-        find_own_weights(w, r->list[i], own);
-        find_weights(w, from + size * i, own, x);
+        unit_noise room;
+        const unit_noise *noise = noise_around(w, r->list[i], &room);
+        find_own_weights(w, r->list[i], noise, own);
+        find_weights(w, from + size * i, noise, own, x);
         out[r->list[i]] = mix(w, in, r->list[i], x);
     }
     forget(r, count);
@@ -469,9 +516,10 @@ static void mix_all(const work *w, const lx_estimate *in, lx_rgb *out)
 {
     const uint32_t count = w->graph->luxel_count;
     for (uint32_t first = 0; first < count; first += block_luxels) mix_block(w, in, first, count - first < block_luxels ? count : first + block_luxels, out);
+    if (w->knots) w->knots->interpolate(w->knots->user, out);
 }
 
-void lx_denoise_layer(const lx_denoise_graph *graph, lx_light_part part, const lx_estimate *in, void *scratch, lx_rgb *out)
+void lx_denoise_layer(const lx_denoise_graph *graph, lx_light_part part, const lx_estimate *in, const lx_denoise_knots *knots, void *scratch, lx_rgb *out)
 {
     bool is_exact = true;
     for (uint32_t i = 0; i < graph->luxel_count; ++i) {
@@ -479,11 +527,11 @@ void lx_denoise_layer(const lx_denoise_graph *graph, lx_light_part part, const l
         is_exact &= !(in[i].variance > 0);
     }
     if (is_exact) return;
-    work w = lay_out(graph, part, scratch);
+    work w = lay_out(graph, part, knots, scratch);
+    find_unit_noise(&w);
     pool_variances(&w, in);
     filter_input(&w, out);
     calm_variances(&w, out);
-    find_covariances(&w);
     mix_all(&w, in, out);
     filter_pilot(&w, out);
     if (part == lx_light_direct) w.mix_levels = pilot_levels; // its detail is finer, and a pilot tells enough of fewer luxels

@@ -12,8 +12,8 @@
 /// Use:
 ///     lx_denoise_graph_create(map, can_step, user, pool, &graph, error);            // once, for all layers
 ///     void *scratch = lx_malloc_array(1, lx_denoise_scratch_bytes(graph));          // per worker
-///     lx_denoise_layer(graph, lx_light_direct, direct, scratch, direct_out);                         // any layer from any thread
-///     lx_denoise_layer(graph, lx_light_indirect, indirect, scratch, indirect_out);
+///     lx_denoise_layer(graph, lx_light_direct, direct, NULL, scratch, direct_out);                   // any layer from any thread
+///     lx_denoise_layer(graph, lx_light_indirect, indirect, &knots, scratch, indirect_out);
 #ifndef LX_POST_DENOISE_H
 #define LX_POST_DENOISE_H
 
@@ -46,9 +46,16 @@ size_t lx_denoise_scratch_bytes(const lx_denoise_graph *graph);
 /// have weights below zero, which keeps its curvature.
 typedef enum lx_light_part { lx_light_direct, lx_light_indirect } lx_light_part;
 
+/// Luxels whose light was interpolated between others, their knots, up to four texels apart: they have no noise of their own, so knots are denoised and the rest is interpolated again.
+typedef struct lx_denoise_knots {
+    const float *share; ///< [luxel] Sum of the weights that its estimate has in all luxels' light, its own included: 1 or more. 0: it has none, its light is interpolated.
+    void (*interpolate)(void *user, lx_rgb *light); ///< Sets light[luxel] where the share is 0. Called from any thread; must be pure.
+    void *user;
+} lx_denoise_knots;
+
 /// Denoises one layer: `in` [luxel] → `out` [luxel], means alone. `scratch`: lx_denoise_scratch_bytes, 16-byte aligned, content irrelevant before
 /// and after. Variances are those of the mean of the channels, 0 where the light is exact: it stays bit by bit where all within reach are.
-/// Luxels that are not valid keep their value and give none. No value is invented: every channel of `out` lies between those of `in`.
-void lx_denoise_layer(const lx_denoise_graph *graph, lx_light_part part, const lx_estimate *in, void *scratch, lx_rgb *out);
+/// `knots` NULL: no luxel's light is interpolated. Luxels that are not valid keep their value and give none. No value is invented: every channel of `out` lies between those of `in`.
+void lx_denoise_layer(const lx_denoise_graph *graph, lx_light_part part, const lx_estimate *in, const lx_denoise_knots *knots, void *scratch, lx_rgb *out);
 
 #endif
