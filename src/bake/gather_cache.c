@@ -43,7 +43,8 @@ static lx_gather_luxel describe(const lx_gather_job *g, lx_texel *t, uint32_t lu
     uint32_t texel;
     const lx_luxel_page *page = lx_job_page(g->job, luxel, &texel);
     lx_texel_open(t, g->bake, page, texel);
-    lx_gather_luxel out = {.albedo = mean_albedo(g, t), .centre = first_site->position, .reach = near_source_texels * lx_texel_size(t)};
+    lx_gather_luxel out = {.albedo = mean_albedo(g, t), .centre = first_site->position, .texel_m = lx_texel_size(t)};
+    out.reach = near_source_texels * out.texel_m;
     for (uint32_t s = 0; s < g->bake->source_count; ++s)
         if (g->uses[s].layer >= 0 && lx_gather_is_near(g->bake->tracer, &out, s)) out.near_sources |= (uint64_t)1 << s % 64;
     return out;

@@ -33,6 +33,7 @@ typedef struct lx_gather_scratch {
     uint32_t stream[lx_gather_tile_luxels], chart[lx_gather_tile_luxels];
     uint16_t place[lx_gather_tile_luxels];
     uint32_t luxel[lx_gather_tile_luxels]; // of the map
+    bool *is_beside;             // [layer_count] of lamps beside the luxel at work
     uint8_t alone[lx_gather_tile_luxels];  // it sends no gather rays
     lx_rgb sky_light[lx_gather_tile_luxels]; // what the cache's rays met of the sky
     uint8_t sky_weight[lx_gather_tile_luxels]; // of luxels of the tile, later of targets

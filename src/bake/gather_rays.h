@@ -15,6 +15,7 @@
 typedef struct lx_gather_luxel {
     lx_rgb albedo;
     lx_vec3 centre;
+    float texel_m;    ///< Its edge.
     float reach;      ///< How far from the centre a source is near: light of such ones is in no row of direct light, for it differs too much over the luxel.
     uint64_t near_sources; ///< Bit s modulo 64: source s may be near.
 } lx_gather_luxel;

@@ -407,3 +407,22 @@ def layer_does_not_change_when_other_lights_come_and_go():
     alone = bake(mixed_scene(), "alone", 64, 16, 3)  # no sky
     for name in alone.layers:
         close("%s: without the sky" % name, plain, plain.layers[name], alone.layers[name], 1e-6)
+
+
+def lantern_scene(names):
+    """Lamps a few centimetres from the inner sides of a small open box, which hangs over a floor."""
+    scene = Gltf()
+    brass = scene.add_material("brass", base_color=(0.8, 0.7, 0.5))
+    node(scene, "floor", mesh=scene.add_mesh("floor", (box(2, 0.1, 2), brass)))
+    node(scene, "lantern", mesh=scene.add_mesh("lantern", (box(0.16, 0.2, 0.16, skip="-y").flip(), brass)), translation=(0, 1, 0))
+    for name, x in (("a", -0.05), ("b", 0.05)):
+        if name in names:
+            node(scene, name, light=scene.add_light("point", 20), translation=(x, 1.0, 0.02))
+    return scene
+
+
+@both
+def lamp_in_a_lantern_keeps_its_layer_whatever_shines_beside_it():
+    together = bake(lantern_scene("ab"), "together", 64, 64, 3)
+    alone = bake(lantern_scene("a"), "alone", 64, 64, 3)
+    close("a: without b", together, together.layers["a"], alone.layers["a"], 1e-6)
