@@ -10,7 +10,7 @@
 enum {
     lx_gather_tile_luxels = lx_luxel_tile_edge * lx_luxel_tile_edge,
     lx_gather_chunk_luxels = 256,    ///< Of a tile, whose sums are at work at a time.
-    lx_gather_most_pass_rays = 32,
+    lx_gather_most_pass_rays = 64,
     lx_gather_largest_round = 256,   ///< Rays a luxel.
 };
 

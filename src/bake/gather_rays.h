@@ -71,6 +71,12 @@ typedef struct lx_gather_output {
 
 enum { lx_gather_batch_size = 4096 };
 
+/// Rays of a luxel for the cache's passes, where `samples` gather. What they have of noise all luxels share that look it up, and no filter can tell; passes themselves cost next to nothing.
+static inline uint32_t lx_gather_pass_rays(uint32_t samples)
+{
+    return samples < 128 ? 16 : samples < 256 ? 32 : 64;
+}
+
 /// Working memory of one worker.
 typedef struct lx_gather_batch lx_gather_batch;
 lx_gather_batch *lx_gather_batch_create(void);

@@ -44,7 +44,7 @@ static size_t make_starts(const lx_gather_job *g, lx_gather_scratch *s, uint32_t
 enum { beside_rays = 16 };
 static const float beside_texels = 1.5f;
 
-// Marks the layers of lamps beside the luxel. False: there are none.
+// Marks the layers of small lamps beside the luxel. False: there are none.
 static bool find_beside(const lx_gather_job *g, uint32_t luxel, bool *is_beside)
 {
     const lx_tracer *tracer = g->bake->tracer;
@@ -55,8 +55,9 @@ static bool find_beside(const lx_gather_job *g, uint32_t luxel, bool *is_beside)
     memset(is_beside, 0, g->layer_count * sizeof *is_beside);
     for (uint32_t s = 0; s < g->bake->source_count; ++s) {
         const lx_source_use *use = &g->uses[s];
-        if (use->layer < 0 || !(l->near_sources >> s % 64 & 1) || !(tracer->source_spheres[s].power < INFINITY)) continue;
-        if (!(lx_distance(l->centre, tracer->source_spheres[s].centre) < beside_texels * l->texel_m)) continue;
+        const lx_source_sphere *lamp = &tracer->source_spheres[s];
+        if (use->layer < 0 || !(l->near_sources >> s % 64 & 1) || !(lamp->power < INFINITY) || lamp->radius > beside_texels * l->texel_m) continue;
+        if (!(lx_distance(l->centre, lamp->centre) < beside_texels * l->texel_m)) continue;
         const uint32_t cells = use->cells ? 1 : lx_tracer_cell_count(tracer, s);
         for (uint32_t cell = 0; cell < cells; ++cell) is_beside[(uint32_t)use->layer + cell] = true;
         any = true;

@@ -42,7 +42,7 @@ static const struct {
     .worker_cell = lx_luxel_tile_edge * lx_luxel_tile_edge * (sizeof(lx_rgb) + sizeof(float)),
 };
 
-enum { block_texels = lx_luxel_tile_edge * lx_luxel_tile_edge, most_pass_rays = 32, bare_process_bytes = 12 << 20 }; // libraries and what they set up at once
+enum { block_texels = lx_luxel_tile_edge * lx_luxel_tile_edge, bare_process_bytes = 12 << 20 }; // libraries and what they set up at once
 
 static uint64_t texel_count(const lx_bake *bake)
 {
@@ -89,7 +89,7 @@ static uint64_t group_bytes(const lx_bake_job *job, const lx_finish *finish, uin
     const uint64_t met = met_layer_count(bake) < layers ? met_layer_count(bake) : layers;
     uint64_t cache = lookup_bytes(bake) + workers * (cost.batches + cost.worker_row * padded + (uint64_t)cost.worker_cell * largest_cell_count(bake));
     cache += luxels * cost.met * met;
-    if (bounces) cache += luxels * (cost.luxel + cost.pass_ray * most_pass_rays + cost.extra + (cost.rows + (truncated ? cost.pass_rows : 0)) * lx_row_stride((uint32_t)padded) * sizeof(uint16_t));
+    if (bounces) cache += luxels * (cost.luxel + cost.pass_ray * lx_gather_pass_rays(bake->desc.samples) + cost.extra + (cost.rows + (truncated ? cost.pass_rows : 0)) * lx_row_stride((uint32_t)padded) * sizeof(uint16_t));
     const uint64_t finishing = lx_finish_worker_bytes(finish) * (layers < workers ? layers : workers); // the cache is gone by then
     return estimates + (cache > finishing ? cache : finishing);
 }
