@@ -25,7 +25,7 @@ typedef struct lx_gather_scratch {
     lx_gather_start *starts; // [lx_gather_chunk_luxels × rays of a round at most]
     float *sums;            // [2][lx_gather_chunk_luxels][3][row_layers], or [lx_gather_tile_luxels][3][row_layers]
     float *met;             // the same, of what rays meet of light sources
-    float *near_light;      // [lx_gather_tile_luxels][3][row_layers] of sources near the luxel
+    float *near_light;      // [lx_gather_tile_luxels][3][row_layers] of sources near the luxel; later rows of a luxel beside a lamp
     lx_rgb *mean;           // [cells][lx_gather_tile_luxels] of one source
     float *variance;
     uint32_t *found;        // [lx_gather_chunk_luxels][lx_gather_most_pass_rays]
