@@ -118,19 +118,10 @@ uint64_t lx_finish_worker_bytes(const lx_finish *f)
 
 // ---- interpolated light -----------------------------------------------------------------------------------------------------
 
-// Calls back for every interpolated luxel: those of wide grids first, or last.
-static void visit_interpolated(const layers_job *j, bool wide_first, void (*visit)(void *to, uint32_t luxel, const lx_knots *knots), void *to)
+static void visit_interpolated(const layers_job *j, bool coarse_first, void (*visit)(void *to, uint32_t luxel, const lx_knots *knots), void *to)
 {
     const lx_bake_map *map = &j->finish->job->map;
-    for (uint32_t k = 0; k < 2; ++k) {
-        const uint32_t spacing = (k == 0) == wide_first ? lx_wide_spacing : lx_narrow_spacing;
-        for (uint32_t t = 0; t < map->tile_count; ++t) {
-            const lx_luxel_tile *tile = &map->tiles[t];
-            lx_knots knots;
-            for (uint32_t i = tile->first; i < tile->first + tile->count; ++i)
-                if (j->spacing[i] == spacing && lx_find_knots(&map->view, tile, i, spacing, &knots)) visit(to, i, &knots);
-        }
-    }
+    for (uint32_t t = 0; t < map->tile_count; ++t) lx_visit_interpolated(&map->view, &map->tiles[t], j->spacing, coarse_first, visit, to);
 }
 
 static void hand_on_share(void *to, uint32_t luxel, const lx_knots *knots)

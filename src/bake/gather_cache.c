@@ -37,12 +37,17 @@ static lx_rgb mean_albedo(const lx_gather_job *g, lx_texel *t)
     return lx_rgb_scale(sum, 1.0f / places);
 }
 
-// What near hits on the luxel will take of it.
-static lx_gather_luxel describe(const lx_gather_job *g, lx_texel *t, uint32_t luxel, const lx_receiver *first_site)
+static void open_luxel(const lx_gather_job *g, lx_texel *t, uint32_t luxel)
 {
     uint32_t texel;
     const lx_luxel_page *page = lx_job_page(g->job, luxel, &texel);
     lx_texel_open(t, g->bake, page, texel);
+}
+
+// What near hits on the luxel will take of it.
+static lx_gather_luxel describe(const lx_gather_job *g, lx_texel *t, uint32_t luxel, const lx_receiver *first_site)
+{
+    open_luxel(g, t, luxel);
     lx_gather_luxel out = {.albedo = mean_albedo(g, t), .centre = first_site->position, .texel_m = lx_texel_size(t)};
     out.reach = near_source_texels * out.texel_m;
     for (uint32_t s = 0; s < g->bake->source_count; ++s)
@@ -55,9 +60,7 @@ static void describe_invalid(const lx_gather_job *g, lx_texel *t, const lx_luxel
 {
     for (uint32_t i = tile->first; i < tile->first + tile->count; ++i) {
         if (g->job->map.valid[i]) continue;
-        uint32_t texel;
-        const lx_luxel_page *page = lx_job_page(g->job, i, &texel);
-        lx_texel_open(t, g->bake, page, texel);
+        open_luxel(g, t, i);
         g->luxels[i] = (lx_gather_luxel){.albedo = mean_albedo(g, t)};
     }
 }

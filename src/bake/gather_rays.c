@@ -564,6 +564,13 @@ static lx_result find_slow_row(lx_gather_batch *b, const lx_gather_settings *set
     return LX_OK;
 }
 
+// Asks for the places of a block of hits.
+static void ask_block(const lx_gather_batch *b, const lx_gather_settings *settings, size_t first, size_t count, lx_taps taps[block_size])
+{
+    for (size_t i = first; i < first + block_size && i < count; ++i)
+        if (b->slow_hits[i].surface != LX_MISS) taps[i - first] = slow_taps(settings, &b->flights[i], &b->slow_hits[i]);
+}
+
 // What needs no shading: rays that left the scene, hits that are black or looked up. Others stay, in order; *count is how many.
 static lx_result finish_simple(lx_gather_batch *b, const lx_gather_settings *settings, size_t *count, const lx_gather_output *out, lx_error *error)
 {
@@ -573,8 +580,7 @@ static lx_result finish_simple(lx_gather_batch *b, const lx_gather_settings *set
     for (size_t i = 0; i < *count && result == LX_OK; ++i) {
         const flight *f = &b->flights[i];
         const lx_hit *hit = &b->slow_hits[i];
-        for (size_t k = i; i % block_size == 0 && k < i + block_size && k < *count; ++k)
-            if (b->slow_hits[k].surface != LX_MISS) taps[k % block_size] = slow_taps(settings, &b->flights[k], &b->slow_hits[k]);
+        if (i % block_size == 0) ask_block(b, settings, i, *count, taps);
         if (hit->surface == LX_MISS) {
             if (brings(settings, f, settings->tracer->source_count - 1)) // the sky, if there is one
                 add_sky(settings, out, f->throughput, f->cosine, f->target, b->slow_rays[i].direction, f->vertex);

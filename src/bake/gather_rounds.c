@@ -243,22 +243,22 @@ static lx_estimate interpolate(const lx_estimate *of, const lx_knots *knots)
     return e;
 }
 
+static void interpolate_layers(void *user, uint32_t luxel, const lx_knots *knots)
+{
+    const lx_gather_job *g = user;
+    for (uint32_t l = 0; l < g->layer_count; ++l) {
+        lx_estimate *layer = g->indirect + (size_t)l * g->luxel_count;
+        layer[luxel] = interpolate(layer, knots);
+    }
+}
+
 // What the tile's luxels without gather rays have from their knots. The met part of direct light they have from their samples.
 static lx_result interpolate_tile(void *user, size_t task, uint32_t worker, lx_error *error)
 {
     (void)worker;
     (void)error;
-    const lx_gather_job *g = user;
-    const lx_luxel_tile *tile = &g->job->map.tiles[task];
-    for (uint32_t spacing = lx_wide_spacing; spacing >= lx_narrow_spacing; spacing /= 2)
-        for (uint32_t i = tile->first; i < tile->first + tile->count; ++i) {
-            lx_knots knots;
-            if (g->spacing[i] != spacing || !lx_find_knots(&g->job->map.view, tile, i, spacing, &knots)) continue;
-            for (uint32_t l = 0; l < g->layer_count; ++l) {
-                lx_estimate *layer = g->indirect + (size_t)l * g->luxel_count;
-                layer[i] = interpolate(layer, &knots);
-            }
-        }
+    lx_gather_job *g = user;
+    lx_visit_interpolated(&g->job->map.view, &g->job->map.tiles[task], g->spacing, true, interpolate_layers, g);
     return LX_OK;
 }
 

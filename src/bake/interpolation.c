@@ -76,3 +76,13 @@ void lx_choose_spacing(const lx_luxel_map *map, const lx_luxel_tile *tile, const
             if (is_smooth(map, tile, closeness, i, spacings[k], bound)) spacing[i] = spacings[k];
     }
 }
+
+void lx_visit_interpolated(const lx_luxel_map *map, const lx_luxel_tile *tile, const uint8_t *spacing, bool coarse_first,
+                           void (*visit)(void *user, uint32_t luxel, const lx_knots *knots), void *user)
+{
+    const uint32_t grids[] = {coarse_first ? lx_wide_spacing : lx_narrow_spacing, coarse_first ? lx_narrow_spacing : lx_wide_spacing};
+    lx_knots knots;
+    for (int k = 0; k < 2; ++k)
+        for (uint32_t i = tile->first; i < tile->first + tile->count; ++i)
+            if (spacing[i] == grids[k] && lx_find_knots(map, tile, i, grids[k], &knots)) visit(user, i, &knots);
+}

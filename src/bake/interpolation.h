@@ -31,4 +31,9 @@ bool lx_find_knots(const lx_luxel_map *map, const lx_luxel_tile *tile, uint32_t 
 /// serves as a knot. `bound`: share of its light by which interpolation may err. Writes spacing[tile->first …], reads nothing of other tiles.
 void lx_choose_spacing(const lx_luxel_map *map, const lx_luxel_tile *tile, const float *closeness, float bound, uint8_t *spacing);
 
+/// Calls `visit` for every luxel of the tile that is interpolated by its spacing, with its knots: those of the coarse grid first (to interpolate), or last (to hand back to knots
+/// what was interpolated from them).
+void lx_visit_interpolated(const lx_luxel_map *map, const lx_luxel_tile *tile, const uint8_t *spacing, bool coarse_first,
+                           void (*visit)(void *user, uint32_t luxel, const lx_knots *knots), void *user);
+
 #endif

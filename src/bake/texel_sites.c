@@ -49,7 +49,7 @@ static void make_piece(const lx_bake *bake, const lx_fragment *f, lx_piece *piec
     piece->shading_normal = piece->normal;
     if (piece->smooth && are_equal(piece->vertex_normal)) { // as exporters write faces with hard edges
         piece->smooth = false;
-        piece->shading_normal = lx_normal_at(tracer, f->surface, f->triangle, 0, 0, piece->normal);
+        if (lx_dot(piece->vertex_normal[0], piece->normal) > 0) piece->shading_normal = piece->vertex_normal[0];
     }
     const lx_vec3 cross = lx_cross(lx_sub(piece->world[1], piece->world[0]), lx_sub(piece->world[2], piece->world[0]));
     piece->texel_m = (float)sqrt((double)lx_length(cross) / fabs(piece->whole));
@@ -174,7 +174,7 @@ static lx_vec3 lift(const lx_tracer *tracer, const lx_piece *piece, lx_vec2 b, l
     return lx_mad(position, shift, hit.surface == LX_MISS ? 1.0f : 0.5f * hit.t);
 }
 
-// As lx_normal_at has it, from vertex normals that are at hand.
+// As hits have it, from vertex normals that are at hand; one that points behind the triangle can't tell which way is up.
 static lx_vec3 smooth_normal(const lx_piece *piece, lx_vec2 b)
 {
     const lx_vec3 sum = lx_add(lx_add(lx_scale(piece->vertex_normal[0], 1 - b.x - b.y), lx_scale(piece->vertex_normal[1], b.x)), lx_scale(piece->vertex_normal[2], b.y));

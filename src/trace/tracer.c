@@ -504,11 +504,6 @@ bool lx_triangle_normals(const lx_tracer *tracer, uint32_t surface, uint32_t tri
     return true;
 }
 
-lx_vec3 lx_normal_at(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, float u, float v, lx_vec3 geometric)
-{
-    return interpolated_normal(&tracer->surfaces[surface], triangle, u, v, geometric);
-}
-
 bool lx_surface_is_plain(const lx_tracer *tracer, uint32_t surface)
 {
     return tracer->surfaces[surface].kind != LX_SURFACE_TRANSLUCENT && tracer->scene->surfaces[surface].source < 0;

@@ -98,8 +98,6 @@ void lx_triangle_corners(const lx_tracer *tracer, uint32_t surface, uint32_t tri
 bool lx_triangle_normals(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, lx_vec3 normals[3]);
 /// Its unit geometric normal, on the front side.
 lx_vec3 lx_triangle_normal(const lx_tracer *tracer, uint32_t surface, const lx_vec3 corners[3]);
-/// Interpolated unit normal at barycentrics (u, v), on the front side; `geometric` where there is none.
-lx_vec3 lx_normal_at(const lx_tracer *tracer, uint32_t surface, uint32_t triangle, float u, float v, lx_vec3 geometric);
 /// Does the surface shine or shade from its back too?
 bool lx_surface_is_double_sided(const lx_tracer *tracer, uint32_t surface);
 /// Is a hit on its front (or on its back, which is black unless it is double-sided) all there is to know of it: opaque, and no light source?
