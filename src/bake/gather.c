@@ -35,9 +35,9 @@ static void choose_scales(lx_gather_job *g)
     for (uint32_t s = 0; s < g->bake->source_count; ++s) {
         const lx_source_use *use = &g->uses[s];
         if (use->layer < 0) continue;
-        const uint32_t cells = use->cells ? 1 : lx_tracer_cell_count(g->bake->tracer, s);
-        for (uint32_t cell = 0; cell < cells; ++cell)
-            g->scales[(uint32_t)use->layer + cell] += lx_rgb_max(use->weight) * g->bake->tracer->source_scales[s] * 20;
+        const uint32_t layers = lx_source_use_layers(use, g->bake->tracer, s);
+        for (uint32_t l = 0; l < layers; ++l)
+            g->scales[(uint32_t)use->layer + l] += lx_rgb_max(use->weight) * g->bake->tracer->source_scales[s] * 20;
     }
     for (uint32_t l = 0; l < g->row_layers; ++l) {
         int exponent;
@@ -114,8 +114,8 @@ static lx_result allocate_met(lx_gather_job *g, lx_error *error)
     for (uint32_t s = 0; g->met && is_met && s < g->bake->source_count; ++s) {
         const lx_source_use *use = &g->uses[s];
         if (use->layer < 0 || !lx_bake_meets(g->bake, s)) continue;
-        const uint32_t cells = use->cells ? 1 : lx_tracer_cell_count(g->bake->tracer, s);
-        for (uint32_t cell = 0; cell < cells; ++cell) is_met[(uint32_t)use->layer + cell] = true;
+        const uint32_t layers = lx_source_use_layers(use, g->bake->tracer, s);
+        for (uint32_t l = 0; l < layers; ++l) is_met[(uint32_t)use->layer + l] = true;
     }
     for (uint32_t l = 0; is_met && l < g->layer_count; ++l) count += is_met[l];
     if (count > 0) g->met_estimates = lx_calloc_array(count, g->luxel_count * sizeof *g->met_estimates);

@@ -58,8 +58,8 @@ static bool find_beside(const lx_gather_job *g, uint32_t luxel, bool *is_beside)
         const lx_source_sphere *lamp = &tracer->source_spheres[s];
         if (use->layer < 0 || !(l->near_sources >> s % 64 & 1) || !(lamp->power < INFINITY) || lamp->radius > beside_texels * l->texel_m) continue;
         if (!(lx_distance(l->centre, lamp->centre) < beside_texels * l->texel_m)) continue;
-        const uint32_t cells = use->cells ? 1 : lx_tracer_cell_count(tracer, s);
-        for (uint32_t cell = 0; cell < cells; ++cell) is_beside[(uint32_t)use->layer + cell] = true;
+        const uint32_t layers = lx_source_use_layers(use, tracer, s);
+        for (uint32_t k = 0; k < layers; ++k) is_beside[(uint32_t)use->layer + k] = true;
         any = true;
     }
     return any;

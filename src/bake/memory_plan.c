@@ -72,7 +72,7 @@ static uint32_t met_layer_count(const lx_bake *bake)
     uint32_t count = 0;
     for (uint32_t s = 0; s < bake->source_count; ++s) {
         if (bake->uses[s].layer < 0 || !lx_bake_meets(bake, s)) continue;
-        count += bake->uses[s].cells ? 1 : lx_tracer_cell_count(bake->tracer, s);
+        count += lx_source_use_layers(&bake->uses[s], bake->tracer, s);
     }
     return count < bake->layer_count ? count : bake->layer_count;
 }

@@ -16,6 +16,12 @@ typedef struct lx_source_use {
                          ///< has its own layer.
 } lx_source_use;
 
+/// How many layers, from `use->layer` on, source `source` is a part of.
+static inline uint32_t lx_source_use_layers(const lx_source_use *use, const lx_tracer *tracer, uint32_t source)
+{
+    return use->cells ? 1 : lx_tracer_cell_count(tracer, source);
+}
+
 typedef struct lx_path_settings {
     const lx_tracer *tracer;
     const lx_source_use *uses; ///< One per source of the tracer.
