@@ -7,7 +7,8 @@
 //    input, squared, is known; how much of that difference is the input's noise is the variance times the weight that the luxel itself
 //    does not have in the candidate. That is all it takes: linear equations, as many as candidates.
 // 4. The same once more, with what came out as a pilot ([Dabov2007], "Image Denoising by Sparse 3-D Transform-Domain Collaborative Filtering", does so): what candidates do to
-//    the light is seen in the pilot, and what they do to the noise is known from their kernels, so that the equations are hardly noisy any more.
+//    the light is seen in the pilot, and what they do to the noise is known from their kernels, so that the equations are hardly noisy any more. For indirect light the pilot
+//    guides further candidates, which keep to luxels where it is alike.
 //
 // Where light is interpolated between knots, all luxels are filtered, but only knots are mixed, by what kernels do to the noise of knots so far apart. What is between them
 // is interpolated again.
@@ -21,7 +22,7 @@ enum {
     direction_count = lx_denoise_direction_count,
     level_count = lx_denoise_level_count,
     narrow_levels = level_count,                      // along one axis
-    most_candidates = level_count + 2 * narrow_levels,
+    most_candidates = level_count + 2 * narrow_levels, // a guided candidate has the place of one along an axis
     pool_levels = 3,                                  // over which products of differences, and variances, are pooled
     pilot_levels = 2,                                 // over which products of a pilot's are
     most_products = most_candidates * (most_candidates + 1) / 2 + 1, // and a weight
@@ -40,6 +41,7 @@ static const float unsure = 0.05f; // relative variance at which a luxel's own v
 // Differences between neighbours tell of noise up to so many times what variances expect, and lower these to a tenth at most.
 static const float most_difference = 4, least_calm = 0.1f;
 static const float pilot_trust = 0.8f; // there is noise left in it that passes for light
+static const float guide_width = 4;    // standard deviations of the input's noise by which a pilot's luxels that are alike may differ
 // Covariances come from some tens of luxels: their diagonals are raised by a share, and by that of the noise; less so where a pilot tells of the light.
 static const float ridges[] = {0.2f, 0.05f}, ridges_of_noise[] = {0.01f, 0.003f};
 
@@ -64,6 +66,7 @@ typedef struct unit_noise {
 typedef struct work {
     const lx_denoise_graph *graph;
     const lx_denoise_knots *knots; // NULL: every luxel is one
+    lx_light_part part;
     uint32_t candidate_count;
     bool may_sharpen;            // weights below zero: kernels that keep curvature
     lx_rgb *candidates[most_candidates]; // [luxel]
@@ -92,7 +95,7 @@ size_t lx_denoise_scratch_bytes(const lx_denoise_graph *graph)
 
 static work lay_out(const lx_denoise_graph *graph, lx_light_part part, const lx_denoise_knots *knots, void *scratch)
 {
-    work w = {.graph = graph, .knots = knots, .candidate_count = part == lx_light_direct ? most_candidates : level_count, .may_sharpen = part == lx_light_indirect, .mix_levels = pool_levels};
+    work w = {.graph = graph, .knots = knots, .part = part, .candidate_count = part == lx_light_direct ? most_candidates : level_count, .may_sharpen = part == lx_light_indirect, .mix_levels = pool_levels};
     const size_t count = graph->luxel_count;
     w.region = scratch;
     lx_rgb *next = (lx_rgb *)(void *)(w.region + 1);
@@ -167,16 +170,42 @@ static void pool_variances(const work *w, const lx_estimate *in)
 
 // ---- candidates -----------------------------------------------------------------------------------------------------------------
 
-// Weights of the neighbours at a level; returns their sum and the luxel's own.
-static float neighbour_weights(const uint32_t *link, int axis, float *weights)
+// A candidate is filtered up to `level` along an axis, or both; from the input if `before` is -1, else from that candidate.
+typedef struct shape {
+    int axis, level, before;
+    bool is_guided; // by the pilot
+} shape;
+
+static shape shape_of(lx_light_part part, int candidate)
 {
+    if (candidate < level_count) return (shape){every_axis, candidate, candidate - 1, false};
+    const int level = (candidate - level_count) % narrow_levels, before = level == 0 ? -1 : candidate - 1;
+    if (part == lx_light_indirect) return (shape){every_axis, level, before, true};
+    return (shape){candidate < level_count + narrow_levels ? 0 : 2, level, before, false};
+}
+
+// How far the pilot's light is the same in two luxels, as far as noise would let it be told: 0 … 1.
+static inline float likeness(const work *w, uint32_t a, uint32_t b)
+{
+    const float difference = w->pilot[a] - w->pilot[b], allowed = guide_width * guide_width * (w->variances[a] + w->variances[b]);
+    return allowed > 0 ? allowed / (allowed + difference * difference) : 0;
+}
+
+// Weights of a luxel's neighbours at a level; returns their sum and the luxel's own.
+static inline __attribute__((always_inline)) float neighbour_weights(const work *w, uint32_t luxel, shape s, float *weights)
+{
+    const uint32_t *link = links_at(w->graph, s.level) + (size_t)luxel * direction_count;
     float total = kernel_center;
     for (int d = 0; d < direction_count / 2; ++d) {
         const int back = d + direction_count / 2;
         float a = 0, b = 0;
-        if (axis == every_axis || axis == d) {
+        if (s.axis == every_axis || s.axis == d) {
             a = kernel[d] * (float)(link[d] & lx_denoise_most_weight);
             b = kernel[back] * (float)(link[back] & lx_denoise_most_weight);
+            if (s.is_guided) {
+                a *= likeness(w, luxel, link[d] >> lx_denoise_weight_bits);
+                b *= likeness(w, luxel, link[back] >> lx_denoise_weight_bits);
+            }
             const float most = lx_min(a, b) + unpaired_share * fabsf(a - b);
             a = lx_min(a, most);
             b = lx_min(b, most);
@@ -188,52 +217,54 @@ static float neighbour_weights(const uint32_t *link, int axis, float *weights)
     return total;
 }
 
-// One level of the wavelet, [Dammertz2010] without its edges, of `size` numbers a luxel.
-static inline __attribute__((always_inline)) void filter_level(const lx_denoise_graph *graph, int level, int axis, size_t size, const float *restrict in,
-                                                               float *restrict out)
+// One level of the wavelet, [Dammertz2010] with its edges or without, of the first `size` of `stride` numbers a luxel.
+static inline __attribute__((always_inline)) void filter_level(const work *w, shape s, size_t size, size_t stride, const float *restrict in, float *restrict out)
 {
-    const uint32_t *link = links_at(graph, level);
-    for (uint32_t i = 0; i < graph->luxel_count; ++i, link += direction_count) {
+    const uint32_t *link = links_at(w->graph, s.level);
+    for (uint32_t i = 0; i < w->graph->luxel_count; ++i, link += direction_count) {
         float weights[direction_count], sum[3];
-        const float scale = 1 / neighbour_weights(link, axis, weights);
-        for (size_t k = 0; k < size; ++k) sum[k] = kernel_center * in[size * i + k];
+        const float scale = 1 / neighbour_weights(w, i, s, weights);
+        for (size_t k = 0; k < size; ++k) sum[k] = kernel_center * in[stride * i + k];
         for (int d = 0; d < direction_count; ++d) {
             if (weights[d] == 0) continue;
-            const float *other = in + size * (link[d] >> lx_denoise_weight_bits);
+            const float *other = in + stride * (link[d] >> lx_denoise_weight_bits);
             for (size_t k = 0; k < size; ++k) sum[k] += weights[d] * other[k];
         }
         for (size_t k = 0; k < size; ++k) out[size * i + k] = scale * sum[k];
     }
 }
 
-// A candidate is filtered up to `level` along an axis, or both; from the input if `before` is -1, else from that candidate.
-typedef struct shape {
-    int axis, level, before;
-} shape;
-
-static shape shape_of(int candidate)
-{
-    if (candidate < level_count) return (shape){every_axis, candidate, candidate - 1};
-    const int level = (candidate - level_count) % narrow_levels;
-    return (shape){candidate < level_count + narrow_levels ? 0 : 2, level, level == 0 ? -1 : candidate - 1};
-}
-
 static void filter_input(const work *w, const lx_rgb *input)
 {
     for (int k = 0; k < (int)w->candidate_count; ++k) {
-        const shape s = shape_of(k);
-        filter_level(w->graph, s.level, s.axis, 3, s.before < 0 ? &input->r : &w->candidates[s.before]->r, &w->candidates[k]->r);
+        const shape s = shape_of(w->part, k);
+        filter_level(w, s, 3, 3, s.before < 0 ? &input->r : &w->candidates[s.before]->r, &w->candidates[k]->r);
     }
 }
 
-static void filter_pilot(work *w, const lx_rgb *pilot)
+static void filter_pilot(const work *w, int first, int end)
+{
+    for (int k = first; k < end; ++k) {
+        const shape s = shape_of(w->part, k);
+        filter_level(w, s, 1, 1, s.before < 0 ? w->pilot : w->filtered[s.before], w->filtered[k]);
+    }
+}
+
+static void take_pilot(work *w, const lx_rgb *pilot, const lx_estimate *in)
 {
     for (uint32_t i = 0; i < w->graph->luxel_count; ++i) w->pilot[i] = mean_of(pilot[i]);
-    for (int k = 0; k < (int)w->candidate_count; ++k) {
-        const shape s = shape_of(k);
-        filter_level(w->graph, s.level, s.axis, 1, s.before < 0 ? w->pilot : w->filtered[s.before], w->filtered[k]);
-    }
     w->has_pilot = true;
+    filter_pilot(w, 0, (int)w->candidate_count);
+    if (w->part == lx_light_direct) return;
+    w->candidate_count = 2 * level_count;
+    filter_pilot(w, level_count, 2 * level_count);
+    for (int k = level_count; k < 2 * level_count; ++k) {
+        const shape s = shape_of(w->part, k);
+        if (s.before < 0)
+            filter_level(w, s, 3, sizeof *in / sizeof(float), &in->mean.r, &w->candidates[k]->r);
+        else
+            filter_level(w, s, 3, 3, &w->candidates[s.before]->r, &w->candidates[k]->r);
+    }
 }
 
 // Kernels are products of one along each axis, of [1 2 1] / 4 at the steps of all levels up to theirs. What a kernel has of a knot is what it has of the luxels around, each as far
@@ -264,7 +295,7 @@ static void find_unit_noise(work *w)
         unit_noise *out = &w->noise[s];
         int across[most_candidates], down[most_candidates];
         for (int k = 0; k < most_candidates; ++k) {
-            const shape of = shape_of(k);
+            const shape of = shape_of(lx_light_direct, k);
             across[k] = of.axis == 2 ? 0 : of.level + 1;
             down[k] = of.axis == 0 ? 0 : of.level + 1;
             out->own[k] = own_line[across[k]] * own_line[down[k]];
@@ -272,6 +303,19 @@ static void find_unit_noise(work *w)
                 out->covariance[k][j] = inner[across[k]][across[j]] * inner[down[k]][down[j]] - out->own[k] - out->own[j] + 1;
         }
     }
+}
+
+// The candidate whose kernel a guided one has where light is the same all around: how much more of its noise the guide leaves, a luxel's own weight tells.
+static uint32_t unguided(const work *w, uint32_t candidate)
+{
+    return w->part == lx_light_indirect && candidate >= level_count ? candidate - level_count : candidate;
+}
+
+static float covariance_of(const work *w, const unit_noise *noise, uint32_t a, uint32_t b)
+{
+    a = unguided(w, a);
+    b = unguided(w, b);
+    return a > b ? noise->covariance[a][b] : noise->covariance[b][a];
 }
 
 // The like around a luxel that is in so many luxels' light: a knot among others 1, 2, 4 texels apart is in that of 1, 4, 16.
@@ -282,7 +326,7 @@ static const unit_noise *noise_around(const work *w, uint32_t luxel, unit_noise 
     const bool is_wide = share > 4;
     const unit_noise *a = &w->noise[is_wide], *b = a + 1;
     const float t = is_wide ? lx_min((share - 4) / 12, 1) : (share - 1) / 3;
-    for (uint32_t k = 0; k < w->candidate_count; ++k) {
+    for (uint32_t k = 0; k < level_count; ++k) { // interpolated light is indirect
         room->own[k] = a->own[k] + t * (b->own[k] - a->own[k]);
         for (uint32_t j = 0; j <= k; ++j) room->covariance[k][j] = a->covariance[k][j] + t * (b->covariance[k][j] - a->covariance[k][j]);
     }
@@ -295,11 +339,12 @@ static void find_own_weights(const work *w, uint32_t luxel, const unit_noise *no
     const float *alone = w->noise[0].own;
     float white[most_candidates]; // if neighbours' noise were not its own in part
     for (uint32_t k = 0; k < w->candidate_count; ++k) {
-        const shape s = shape_of((int)k);
+        const shape s = shape_of(w->part, (int)k);
+        const uint32_t like = unguided(w, k);
         float weights[direction_count];
-        white[k] = kernel_center / neighbour_weights(links_at(w->graph, s.level) + (size_t)luxel * direction_count, s.axis, weights);
+        white[k] = kernel_center / neighbour_weights(w, luxel, s, weights);
         if (s.before >= 0) white[k] *= white[s.before];
-        own[k] = noise == &w->noise[0] ? white[k] : 1 - (1 - white[k]) * (1 - noise->own[k]) / (1 - alone[k]);
+        own[k] = noise == &w->noise[0] ? white[k] : 1 - (1 - white[k]) * (1 - noise->own[like]) / (1 - alone[like]);
     }
 }
 
@@ -312,12 +357,11 @@ static void calm_variances(const work *w, const lx_rgb *input)
     } calm;
     const uint32_t count = w->graph->luxel_count;
     calm *a = (calm *)(void *)w->filtered[0], *b = (calm *)(void *)w->filtered[2]; // two numbers: two arrays' place
-    const uint32_t *link = links_at(w->graph, 0);
-    for (uint32_t i = 0; i < count; ++i, link += direction_count) {
+    for (uint32_t i = 0; i < count; ++i) {
         a[i] = (calm){0, 0};
         if (!(w->variances[i] > 0) || share_of(w, i) == 0) continue;
         float weights[direction_count];
-        const float scale = 1 / neighbour_weights(link, every_axis, weights);
+        const float scale = 1 / neighbour_weights(w, i, (shape){every_axis, 0, -1, false}, weights);
         float expected = (1 - kernel_center * scale) * (1 - kernel_center * scale);
         for (int d = 0; d < direction_count; ++d) expected += weights[d] * weights[d] * scale * scale;
         unit_noise room;
@@ -439,8 +483,8 @@ static void find_weights(const work *w, const float *products, const unit_noise 
         for (uint32_t i = 0; i < used_count; ++i) {
             const uint32_t k = used[i];
             y[i] = 1 - own[k];
-            whole[i] = w->has_pilot ? sqrtf(y[i] / (1 - noise->own[k])) : 0;
-            for (uint32_t j = 0; j <= i; ++j) a[i][j] = products[k * (k + 1) / 2 + used[j]] * trust + whole[i] * whole[j] * noise->covariance[k][used[j]];
+            whole[i] = w->has_pilot ? sqrtf(y[i] / (1 - noise->own[unguided(w, k)])) : 0;
+            for (uint32_t j = 0; j <= i; ++j) a[i][j] = products[k * (k + 1) / 2 + used[j]] * trust + whole[i] * whole[j] * covariance_of(w, noise, k, used[j]);
             a[i][i] = a[i][i] * (1 + ridges[w->has_pilot]) + ridges_of_noise[w->has_pilot];
         }
         solve(a, used_count, y);
@@ -533,7 +577,7 @@ void lx_denoise_layer(const lx_denoise_graph *graph, lx_light_part part, const l
     filter_input(&w, out);
     calm_variances(&w, out);
     mix_all(&w, in, out);
-    filter_pilot(&w, out);
+    take_pilot(&w, out, in);
     if (part == lx_light_direct) w.mix_levels = pilot_levels; // its detail is finer, and a pilot tells enough of fewer luxels
     mix_all(&w, in, out);
 }
