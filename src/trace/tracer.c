@@ -267,12 +267,12 @@ static lx_source_sphere sphere_of_emissive(const lx_tracer *tracer, uint32_t sou
     lx_bounds bounds = lx_bounds_empty();
     lx_vec3 p[3];
     for (uint32_t i = e->first_triangle[source]; i < e->first_triangle[source + 1]; ++i) {
-        lx_triangle_corners(tracer, e->triangles[i].surface, e->triangles[i].triangle, p);
+        lx_triangle_corners(tracer, e->places[i].surface, e->places[i].triangle, p);
         for (int k = 0; k < 3; ++k) lx_bounds_add(&bounds, p[k]);
     }
     lx_source_sphere s = {.centre = lx_scale(lx_add(bounds.low, bounds.high), 0.5f), .power = e->source_power[source]};
     for (uint32_t i = e->first_triangle[source]; i < e->first_triangle[source + 1]; ++i) {
-        lx_triangle_corners(tracer, e->triangles[i].surface, e->triangles[i].triangle, p);
+        lx_triangle_corners(tracer, e->places[i].surface, e->places[i].triangle, p);
         for (int k = 0; k < 3; ++k) s.radius = lx_max(s.radius, lx_distance(s.centre, p[k]));
     }
     s.radius *= 1.0001f;
@@ -435,27 +435,6 @@ void lx_trace_transmittance(const lx_tracer *tracer, const lx_ray *rays, lx_rgb 
 bool lx_trace_crowded(const lx_tracer *tracer, const lx_patch *patches, size_t count)
 {
     return lx_accel_crowded(tracer->accel, patches, count);
-}
-
-static float offset_component(float position, float normal)
-{
-    static const float origin = 1.0f / 32, float_scale = 1.0f / 65536, int_scale = 256;
-    if (fabsf(position) < origin) return position + float_scale * normal;
-    int32_t bits;
-    memcpy(&bits, &position, sizeof bits);
-    const int32_t steps = (int32_t)(int_scale * normal);
-    bits += position < 0 ? -steps : steps;
-    memcpy(&position, &bits, sizeof position);
-    return position;
-}
-
-// Coordinates of different size get steps of different size, so the sum of all three would also drift along the surface, and near an edge
-// through the next wall. Only its share along the normal is taken.
-lx_vec3 lx_offset_origin(lx_vec3 position, lx_vec3 normal)
-{
-    const lx_vec3 moved = {offset_component(position.x, normal.x), offset_component(position.y, normal.y),
-                           offset_component(position.z, normal.z)};
-    return lx_mad(position, normal, lx_dot(lx_sub(moved, position), normal));
 }
 
 void lx_ray_step_past(lx_ray *ray, const lx_hit *hit)
