@@ -190,19 +190,24 @@ LX_INLINED void sample_lamp(const lx_source_view *v, lanes *l, lx_view_samples *
     }
 }
 
-// Triangles are chosen for all receivers before any is looked at, so that what is waited for arrives together.
+// Step by step for all receivers, so that what is waited for arrives together.
 static void choose_triangles(const lx_source_view *v, lanes *l)
 {
     const lx_emitters *emitters = &v->tracer->emitters;
+    lx_light_choice choices[size];
+    bool has_choice[size];
     for (int k = 0; k < size; ++k) {
+        has_choice[k] = v->has_table && v->alone[k] && v->reached[k];
+        if (has_choice[k]) choices[k] = lx_light_table_choose(&v->table, &emitters->tree, l->u[k]);
+    }
+    for (int k = 0; k < size; ++k) {
+        const lx_vec3 origin = vector_at(&v->origin, k);
         l->triangle[k] = LX_NO_EMITTER;
         l->probability[k] = 1;
-        if (!v->reached[k]) continue;
-        const lx_vec3 origin = vector_at(&v->origin, k);
-        if (!v->has_table || !v->alone[k])
-            l->triangle[k] = lx_emitters_choose(emitters, v->source, false, origin, &l->u[k], &l->probability[k]);
-        else if (!lx_light_table_sample(&v->table, &emitters->tree, origin, &l->u[k], &l->triangle[k], &l->probability[k]))
+        if (has_choice[k] && !lx_light_tree_finish(&emitters->tree, &choices[k], origin, &l->u[k], &l->triangle[k], &l->probability[k]))
             l->triangle[k] = LX_NO_EMITTER;
+        else if (!has_choice[k] && v->reached[k])
+            l->triangle[k] = lx_emitters_choose(emitters, v->source, false, origin, &l->u[k], &l->probability[k]);
         if (l->triangle[k] != LX_NO_EMITTER) PREFETCH(&emitters->triangles[l->triangle[k]]);
     }
 }
