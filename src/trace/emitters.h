@@ -61,7 +61,7 @@ bool lx_emitters_sample(const lx_emitters *emitters, uint32_t source, bool by_po
 float lx_emitters_pdf_area(const lx_emitters *emitters, uint32_t source, uint32_t index, lx_vec3 viewer, float u, float v);
 
 /// A plain triangle so near that cosine and distance differ a lot over it is sampled by solid angle. `corner`: its origin from the viewer.
-static inline bool lx_emitter_is_near(lx_vec3 corner, lx_vec3 edge1, lx_vec3 edge2, float area)
+LX_INLINED bool lx_emitter_is_near(lx_vec3 corner, lx_vec3 edge1, lx_vec3 edge2, float area)
 {
     const float near_areas = 16; // square of the distance over the area
     const lx_vec3 centre = lx_mad(corner, lx_add(edge1, edge2), 1.0f / 3);

@@ -44,7 +44,7 @@ float lx_hit_weight(const lx_tracer *tracer, const lx_ray *ray, const lx_hit *hi
 float lx_sky_weight(const lx_tracer *tracer, lx_vec3 direction, float cosine);
 
 /// The power heuristic of Veach 1997, section 9.2.4.
-static inline float lx_power_heuristic(float pdf_a, float pdf_b)
+LX_INLINED float lx_power_heuristic(float pdf_a, float pdf_b)
 {
     const float a = pdf_a * pdf_a, b = pdf_b * pdf_b;
     return (a + b > 0) & (a < INFINITY) ? a / (a + b) : 1;

@@ -40,24 +40,25 @@ LX_INLINED void find_origins(lx_source_view *v)
 LX_INLINED void find_reached(lx_source_view *v, const lx_source_sphere *s)
 {
     const lx_light *light = v->lamp.light;
-    const float range = light && light->range > 0 ? light->range : INFINITY;
+    // Limits that nothing reaches where they do not count.
     const bool is_spot = light && light->kind == LX_LIGHT_SPOT, is_area = light && (light->kind == LX_LIGHT_RECT || light->kind == LX_LIGHT_DISK);
+    const float range = light && light->range > 0 ? light->range : INFINITY, cos_outer = is_spot ? s->cos_outer : -2, least = is_area ? 0 : -INFINITY;
     const lx_vec3 axis = light ? light->direction : (lx_vec3){0, 0, 0};
-    const float centre_x = s->centre.x, centre_y = s->centre.y, centre_z = s->centre.z, radius = s->radius, cos_outer = s->cos_outer;
+    const float centre_x = s->centre.x, centre_y = s->centre.y, centre_z = s->centre.z, radius = s->radius;
     for (int k = 0; k < size; ++k) {
         const lx_receiver r = receiver_at(v, k);
         const lx_vec3 to_centre = lx_sub((lx_vec3){centre_x, centre_y, centre_z}, r.position);
         const float distance = lx_length(to_centre), facing = -lx_dot(axis, to_centre);
         const bool above = (lx_dot(to_centre, r.normal) > -radius) & (lx_dot(to_centre, r.geometric_normal) > -radius);
-        const bool turned = (distance >= range) | (is_spot & (facing < cos_outer * distance)) | (is_area & !(facing > 0));
-        v->reached[k] = above & ((distance <= radius) | !turned);
+        const bool turned = (distance >= range) | (facing < cos_outer * distance) | !(facing > least);
+        v->reached[k] = above & ((distance <= radius) | !turned) ? 1 : 0;
     }
 }
 
 // Does any of a few triangles shine on the receiver, with any of its corners above the horizon? What rounding could hide is next to nothing, but kept.
 LX_INLINED void find_lit(lx_source_view *v, const lx_emitter_triangle *triangles, uint32_t count)
 {
-    bool lit[size] = {false};
+    int32_t lit[size] = {0};
     for (uint32_t i = 0; i < count; ++i) {
         const lx_emitter_triangle *t = &triangles[i];
         const lx_vec3 corner[3] = {t->origin, lx_add(t->origin, t->edge1), lx_add(t->origin, t->edge2)}, facing = t->normal;
@@ -68,7 +69,7 @@ LX_INLINED void find_lit(lx_source_view *v, const lx_emitter_triangle *triangles
             const float slack = 1e-5f * (lx_max_abs(r.position) + lx_max_abs(a));
             const float along = lx_max(lx_dot(a, r.normal), lx_max(lx_dot(b, r.normal), lx_dot(c, r.normal)));
             const float upright = lx_max(lx_dot(a, r.geometric_normal), lx_max(lx_dot(b, r.geometric_normal), lx_dot(c, r.geometric_normal)));
-            lit[k] |= (both | (-lx_dot(facing, a) > -slack)) & (along > -slack) & (upright > -slack);
+            lit[k] |= (both | (-lx_dot(facing, a) > -slack)) & (along > -slack) & (upright > -slack) ? 1 : 0;
         }
     }
     for (int k = 0; k < size; ++k) v->reached[k] &= lit[k];
@@ -119,13 +120,13 @@ LX_INLINED void look(lx_source_view *v)
     if (s->power < INFINITY)
         find_reached(v, s);
     else
-        memset(v->reached, true, sizeof v->reached);
+        for (int k = 0; k < size; ++k) v->reached[k] = 1;
     const lx_emitters *e = &v->tracer->emitters;
     const bool is_emissive = lx_tracer_source(v->tracer, v->source)->kind == LX_SOURCE_EMISSIVE;
     if (is_emissive && !lx_emitters_has_tree(e, v->source) && e->first_triangle[v->source + 1] - e->first_triangle[v->source] <= size)
         find_lit(v, e->triangles + e->first_triangle[v->source], e->first_triangle[v->source + 1] - e->first_triangle[v->source]);
     v->reaches = false;
-    for (int k = 0; k < size; ++k) v->reaches |= v->reached[k];
+    for (int k = 0; k < size; ++k) v->reaches |= v->reached[k] != 0;
 }
 
 // ---- samples --------------------------------------------------------------------------------------------------------------------
@@ -216,8 +217,8 @@ static void choose_triangles(const lx_source_view *v, lanes *l)
 typedef struct triangles {
     lx_view_vectors origin, edge1, edge2, normal;
     float area[size];
-    bool both[size];    // shines from both sides
-    bool uneven[size];  // a texture decides where
+    float both[size];    // 1: shines from both sides
+    float uneven[size];  // 1: a texture decides where
     float weighed[size]; // count of samples against a hit; 0: samples alone
 } triangles;
 
@@ -230,18 +231,18 @@ static void fetch_triangles(const lx_source_view *v, const lanes *l, uint32_t co
         set_vector(&out->edge2, k, t->edge2);
         set_vector(&out->normal, k, t->normal);
         out->area[k] = t->area;
-        out->both[k] = t->double_sided;
-        out->uneven[k] = t->grid != 1;
+        out->both[k] = t->double_sided ? 1 : 0;
+        out->uneven[k] = t->grid != 1 ? 1 : 0;
         out->weighed[k] = v->alone[k] ? 0 : (float)count;
     }
 }
 
 // Points on triangles by area. `special`: those that ask for more.
-LX_INLINED void locate(const lx_source_view *v, lanes *l, const triangles *t, bool special[size])
+LX_INLINED void locate(const lx_source_view *v, lanes *l, const triangles *t, float special[size])
 {
     for (int k = 0; k < size; ++k) {
         const lx_vec3 corner = lx_sub(vector_at(&t->origin, k), vector_at(&v->origin, k));
-        special[k] = t->uneven[k] | lx_emitter_is_near(corner, vector_at(&t->edge1, k), vector_at(&t->edge2, k), t->area[k]);
+        special[k] = lx_emitter_is_near(corner, vector_at(&t->edge1, k), vector_at(&t->edge2, k), t->area[k]) ? 1 : t->uneven[k];
         const lx_vec2 b = lx_sample_triangle((lx_vec2){l->u[k], l->v[k]});
         l->pdf_area[k] = l->probability[k] / t->area[k];
         l->a[k] = b.x;
@@ -249,11 +250,11 @@ LX_INLINED void locate(const lx_source_view *v, lanes *l, const triangles *t, bo
     }
 }
 
-static void locate_special(const lx_source_view *v, lanes *l, const bool special[size])
+static void locate_special(const lx_source_view *v, lanes *l, const float special[size])
 {
     for (int k = 0; k < size; ++k) {
         lx_emitter_sample s;
-        if (!special[k] || l->triangle[k] == LX_NO_EMITTER) continue;
+        if (special[k] == 0 || l->triangle[k] == LX_NO_EMITTER) continue;
         if (!lx_emitters_locate(&v->tracer->emitters, l->triangle[k], l->probability[k], vector_at(&v->origin, k), (lx_vec2){l->u[k], l->v[k]}, &s)) {
             l->triangle[k] = LX_NO_EMITTER;
             continue;
@@ -272,14 +273,14 @@ LX_INLINED void shine(const lx_source_view *v, lanes *l, const triangles *t, lx_
         const lx_vec3 origin = vector_at(&v->origin, k), towards = vector_at(&t->normal, k);
         const lx_vec3 point = lx_mad(lx_mad(vector_at(&t->origin, k), vector_at(&t->edge1, k), l->a[k]), vector_at(&t->edge2, k), l->b[k]);
         const lx_vec3 to_point = lx_sub(point, origin);
-        const float along = lx_dot(towards, to_point), side = t->both[k] & (along > 0) ? -1 : 1, facing = -side * along;
+        const float along = lx_dot(towards, to_point), side = t->both[k] * along > 0 ? -1 : 1, facing = -side * along;
         const float distance2 = lx_dot(to_point, to_point), distance = sqrtf(distance2);
         const lx_vec3 normal = lx_scale(towards, side);
         const float emitter_cosine = facing / distance, cosine = lx_receiver_cosine(&r, lx_scale(to_point, 1 / distance));
         const float pdf = l->pdf_area[k] * distance2 / emitter_cosine; // solid angle
         const float shared = lx_power_heuristic(t->weighed[k] * pdf, cosine / LX_PI), weight = t->weighed[k] > 0 ? shared : 1;
         set_vector(&out->direction, k, lx_sub(lx_offset_origin(point, normal), origin));
-        l->light[k] = (emitter_cosine > 0) & (cosine > 0) ? weight * cosine / pdf : 0;
+        l->light[k] = emitter_cosine > 0 ? weight * cosine / pdf : 0;
     }
 }
 
@@ -323,7 +324,7 @@ LX_INLINED void sample(const lx_source_view *v, uint32_t key, uint32_t first, ui
         return;
     }
     triangles t;
-    bool special[size];
+    float special[size];
     choose_triangles(v, &l);
     fetch_triangles(v, &l, count, &t);
     locate(v, &l, &t, special);

@@ -20,7 +20,7 @@ typedef struct lx_source_view {
     lx_view_vectors origin;                             ///< and where their shadow rays start.
     float t_max;                       ///< Of all shadow rays.
     bool reaches;                      ///< Something may reach one of the receivers.
-    bool reached[lx_view_size];        ///< It may reach this one.
+    int32_t reached[lx_view_size];     ///< 1: it may reach this one, 0: it does not.
     // Lamps.
     lx_lamp lamp;
     lx_area_view areas[lx_view_size];
