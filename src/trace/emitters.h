@@ -53,6 +53,8 @@ void lx_emitters_release(lx_emitters *emitters);
 /// Chooses a triangle of a source, for what lies at `viewer`, by its tree if there is one; `by_power`: whatever lies at `viewer`. `u` becomes its place within
 /// the choice. LX_NO_EMITTER if the source has nothing bright, or nothing that faces there.
 uint32_t lx_emitters_choose(const lx_emitters *emitters, uint32_t source, bool by_power, lx_vec3 viewer, float *u, float *probability);
+/// Asks for the memory that lx_emitters_locate waits for, given the triangle and its `u`.
+void lx_emitters_prefetch(const lx_emitters *emitters, uint32_t index, float u);
 /// Chooses a point of a triangle that was chosen with `probability`. False: none counts.
 bool lx_emitters_locate(const lx_emitters *emitters, uint32_t index, float probability, lx_vec3 viewer, lx_vec2 u, lx_emitter_sample *out);
 /// Both.

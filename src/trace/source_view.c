@@ -234,6 +234,7 @@ static void fetch_triangles(const lx_source_view *v, const lanes *l, uint32_t co
         out->both[k] = t->double_sided ? 1 : 0;
         out->uneven[k] = t->grid != 1 ? 1 : 0;
         out->weighed[k] = v->alone[k] ? 0 : (float)count;
+        if (l->triangle[k] != LX_NO_EMITTER) lx_emitters_prefetch(&v->tracer->emitters, l->triangle[k], l->u[k]);
     }
 }
 
