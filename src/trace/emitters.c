@@ -6,6 +6,7 @@
 #include "trace/emitters.h"
 
 #include "base/error.h"
+#include "base/memory.h"
 #include "trace/sampling.h"
 #include "trace/tracer_data.h"
 
@@ -350,15 +351,11 @@ bool lx_emitters_sample(const lx_emitters *emitters, uint32_t source, bool by_po
 
 void lx_emitters_prefetch(const lx_emitters *emitters, uint32_t index, float u)
 {
-#if defined(__GNUC__)
     const lx_emitter_triangle *t = &emitters->triangles[index];
     const uint32_t entries = (uint32_t)t->grid * t->grid, guess = t->first_cdf + (uint32_t)(u * (float)entries);
     if (t->grid == 1) return;
-    __builtin_prefetch(&emitters->piece_guide[guess]);
-    __builtin_prefetch(&emitters->piece_cdf[guess]); // where brightness is even, the step is close by
-#else
-    (void)emitters, (void)index, (void)u;
-#endif
+    LX_PREFETCH(&emitters->piece_guide[guess]);
+    LX_PREFETCH(&emitters->piece_cdf[guess]); // where brightness is even, the step is close by
 }
 
 bool lx_emitters_locate(const lx_emitters *emitters, uint32_t index, float probability, lx_vec3 viewer, lx_vec2 u, lx_emitter_sample *out)

@@ -7,12 +7,6 @@
 
 enum { width = lx_light_tree_width, buckets = 12 };
 
-#if defined(__GNUC__)
-#define PREFETCH(address) __builtin_prefetch(address)
-#else
-#define PREFETCH(address) ((void)(address))
-#endif
-
 // Of triangle i of a bin, of the leaf's power.
 static inline float share_in(const lx_light_bin *bin, uint32_t i)
 {
@@ -489,7 +483,7 @@ lx_light_choice lx_light_table_choose(const lx_light_table *table, const lx_ligh
     choice.probability = importance[k] / total;
     choice.first = table->blocks[i].first[k];
     choice.is_leaf = table->blocks[i].is_leaf[k];
-    if (choice.is_leaf) PREFETCH(&tree->bins[choice.first]);
+    if (choice.is_leaf) LX_PREFETCH(&tree->bins[choice.first]);
     return choice;
 }
 

@@ -1,16 +1,11 @@
 #include "trace/source_view.h"
 
+#include "base/memory.h"
 #include "math/sobol.h"
 #include "trace/light_sample.h"
 #include "trace/tracer_data.h"
 
-enum { size = lx_view_size };
-
-#if defined(__GNUC__)
-#define PREFETCH(address) __builtin_prefetch(address)
-#else
-#define PREFETCH(address) ((void)(address))
-#endif
+enum { size = lx_view_size, few_triangles = 16 };
 
 LX_INLINED lx_vec3 vector_at(const lx_view_vectors *v, int k)
 {
@@ -122,9 +117,10 @@ LX_INLINED void look(lx_source_view *v)
     else
         for (int k = 0; k < size; ++k) v->reached[k] = 1;
     const lx_emitters *e = &v->tracer->emitters;
-    const bool is_emissive = lx_tracer_source(v->tracer, v->source)->kind == LX_SOURCE_EMISSIVE;
-    if (is_emissive && !lx_emitters_has_tree(e, v->source) && e->first_triangle[v->source + 1] - e->first_triangle[v->source] <= size)
-        find_lit(v, e->triangles + e->first_triangle[v->source], e->first_triangle[v->source + 1] - e->first_triangle[v->source]);
+    if (lx_tracer_source(v->tracer, v->source)->kind == LX_SOURCE_EMISSIVE && !lx_emitters_has_tree(e, v->source)) {
+        const uint32_t first = e->first_triangle[v->source], count = e->first_triangle[v->source + 1] - first;
+        if (count <= few_triangles) find_lit(v, e->triangles + first, count);
+    }
     v->reaches = false;
     for (int k = 0; k < size; ++k) v->reaches |= v->reached[k] != 0;
 }
@@ -209,7 +205,7 @@ static void choose_triangles(const lx_source_view *v, lanes *l)
             l->triangle[k] = LX_NO_EMITTER;
         else if (!has_choice[k] && v->reached[k])
             l->triangle[k] = lx_emitters_choose(emitters, v->source, false, origin, &l->u[k], &l->probability[k]);
-        if (l->triangle[k] != LX_NO_EMITTER) PREFETCH(&emitters->triangles[l->triangle[k]]);
+        if (l->triangle[k] != LX_NO_EMITTER) LX_PREFETCH(&emitters->triangles[l->triangle[k]]);
     }
 }
 

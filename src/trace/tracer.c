@@ -2,6 +2,7 @@
 #include "trace/tracer.h"
 
 #include "base/error.h"
+#include "base/memory.h"
 #include "math/hash.h"
 #include "trace/tracer_data.h"
 
@@ -567,16 +568,10 @@ static void shade(const lx_tracer *tracer, const lx_hit *hit, lx_shading *s)
     s->emission = s->lit || surface->material->unlit ? surface->emission : (lx_rgb){0, 0, 0};
 }
 
-#if defined(__GNUC__)
-#define PREFETCH(address) __builtin_prefetch(address)
-#else
-#define PREFETCH(address) ((void)(address))
-#endif
-
 // Hits lie anywhere in memory: corners' numbers are asked for some hits ahead, then the corners by their numbers.
 static void prefetch_indices(const lx_tracer *tracer, const lx_hit *hit)
 {
-    if (hit->surface != LX_MISS) PREFETCH(tracer->surfaces[hit->surface].indices + 3 * (size_t)hit->triangle);
+    if (hit->surface != LX_MISS) LX_PREFETCH(tracer->surfaces[hit->surface].indices + 3 * (size_t)hit->triangle);
 }
 
 static void prefetch_corners(const lx_tracer *tracer, const lx_hit *hit)
@@ -585,8 +580,8 @@ static void prefetch_corners(const lx_tracer *tracer, const lx_hit *hit)
     const lx_traced_surface *surface = &tracer->surfaces[hit->surface];
     const uint32_t *indices = surface->indices + 3 * (size_t)hit->triangle;
     for (int k = 0; k < 3; ++k) {
-        PREFETCH(surface->positions + indices[k]);
-        if (surface->normals) PREFETCH(surface->normals + indices[k]);
+        LX_PREFETCH(surface->positions + indices[k]);
+        if (surface->normals) LX_PREFETCH(surface->normals + indices[k]);
     }
 }
 
