@@ -367,7 +367,8 @@ LX_INLINED float below_one(float x)
 LX_INLINED int choose_cluster(const float *importance, const float *sums, int count, float at, float *place)
 {
     int k = 0;
-    for (int i = 0; i < count - 1; ++i) k += at >= sums[i];
+    for (int i = 0; i < count; ++i) k += at >= sums[i];
+    k = k < count ? k : count - 1;
     while (!(importance[k] > 0)) --k;
     *place = below_one((at - (sums[k] - importance[k])) / importance[k]);
     return k;
@@ -473,7 +474,8 @@ lx_light_choice lx_light_table_choose(const lx_light_table *table, const lx_ligh
 {
     const float total = table->sums[lx_light_fine_blocks - 1], at = lx_min(u * total, total * 0x1.fffffep-1f);
     uint32_t i = 0;
-    for (uint32_t block = 0; block < lx_light_fine_blocks - 1; ++block) i += at >= table->sums[block];
+    for (uint32_t block = 0; block < lx_light_fine_blocks; ++block) i += at >= table->sums[block];
+    i = i < lx_light_fine_blocks ? i : lx_light_fine_blocks - 1;
     const float *importance = table->importance[i], before = i > 0 ? table->sums[i - 1] : 0;
     float sums[lx_light_block_size];
     lx_light_choice choice = {.probability = 0};

@@ -111,6 +111,7 @@ static lx_rgb transmittance_at(void *user, uint32_t surface, uint32_t triangle, 
     const lx_tracer *tracer = user;
     if (tracer->surfaces[surface].kind == LX_SURFACE_OPAQUE) return (lx_rgb){0, 0, 0};
     if (tracer->surfaces[surface].kind == LX_SURFACE_CUTOUT) return lx_rgb_grey(is_hole(user, surface, triangle, u, v) ? 1 : 0);
+    if (tracer->surfaces[surface].even) return tracer->surfaces[surface].transmittance;
     const lx_material *m = material_of(tracer, surface);
     const surface_point p = point_of(tracer, surface, triangle, u, v);
     float opacity;
