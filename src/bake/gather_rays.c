@@ -180,24 +180,11 @@ static void add_emission(const lx_gather_settings *settings, const lx_gather_out
 
 // ---- directions -------------------------------------------------------------------------------------------------------------------
 
-// Sine and cosine of 2 pi t, t in [0, 1): Taylor series about the nearest quarter turn, within a few roundings; no branches and no calls, so that loops stay tight.
-static inline void sincos_of_turn(float t, float *sine, float *cosine)
-{
-    const int quarter = (int)(4 * t + 0.5f);
-    const float x = (t - 0.25f * (float)quarter) * (2 * LX_PI), x2 = x * x;
-    const float s = x * (1 - x2 * (1.0f / 6 - x2 * (1.0f / 120 - x2 * (1.0f / 5040 - x2 * (1.0f / 362880)))));
-    const float c = 1 - x2 * (0.5f - x2 * (1.0f / 24 - x2 * (1.0f / 720 - x2 * (1.0f / 40320))));
-    const bool odd = quarter & 1;
-    const float a = odd ? c : s, b = odd ? s : c;
-    *sine = quarter & 2 ? -a : a;
-    *cosine = (quarter + 1) & 2 ? -b : b;
-}
-
 // Cosine-weighted around +Z; pdf = cos(theta) / pi ([PBR4] A.5.3 on a disk in polar coordinates).
 static inline lx_vec3 cosine_direction(lx_vec2 u)
 {
     float sine, cosine;
-    sincos_of_turn(u.y, &sine, &cosine);
+    lx_sincos_of_turn(u.y, &sine, &cosine);
     const float radius = sqrtf(u.x);
     return (lx_vec3){radius * cosine, radius * sine, sqrtf(1 - u.x)};
 }

@@ -5,6 +5,13 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+/// Asks for memory that is read soon, without waiting for it.
+#if defined(__GNUC__)
+#define LX_PREFETCH(address) __builtin_prefetch(address)
+#else
+#define LX_PREFETCH(address) ((void)(address))
+#endif
+
 /// count × size bytes, uninitialised (those aligned to cache lines, if they fill one) or zeroed. Zero elements give a valid, freeable pointer. NULL on overflow or lack of memory.
 void *lx_malloc_array(size_t count, size_t size);
 void *lx_calloc_array(size_t count, size_t size);

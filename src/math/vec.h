@@ -7,6 +7,13 @@
 
 #define LX_PI 3.14159265358979323846f
 
+/// Of functions in loops that must become vectors: a call would keep them from it, and instruction sets are chosen by who includes them.
+#if defined(__GNUC__)
+#define LX_INLINED static inline __attribute__((always_inline))
+#else
+#define LX_INLINED static inline
+#endif
+
 // fminf and fmaxf are calls: they must treat NaN with care that only a library function gives. These are one instruction.
 static inline float lx_min(float a, float b) { return a < b ? a : b; }
 static inline float lx_max(float a, float b) { return a > b ? a : b; }

@@ -25,19 +25,25 @@ struct lx_accel {
 
 enum { batch_size = 256, packet_size = 8, remembered_triangles = 12 };
 
+// A triangle that a shadow ray has crossed.
+typedef struct crossed {
+    uint32_t mesh, triangle;
+    float edge_t; // -1 away from edges
+} crossed;
+
 // What a shadow ray has crossed so far. Embree may report one triangle to a filter more than once (a BVH with spatial splits
-// or a stream that is replayed), so triangles that were counted are remembered.
+// or a stream that is replayed), so triangles that were counted are remembered: apart, since most rays cross none.
 typedef struct crossing {
     lx_rgb transmittance;
-    uint32_t count;
+    uint16_t count;
     bool overflow; // more surfaces than the list holds: the ray is walked again, one closest hit at a time
-    struct { uint32_t mesh, triangle; float edge_t; } seen[remembered_triangles]; // edge_t: -1 away from edges
 } crossing;
 
 typedef struct ray_context {
     struct RTCIntersectContext embree; // first: Embree hands a pointer to it to the filters
     const lx_accel *accel;
     crossing *crossings; // by ray id
+    crossed (*seen)[remembered_triangles];
 } ray_context;
 
 // Embree hands hits and rays to filters as arrays of fields; its accessors exist for C++ only.
@@ -86,13 +92,13 @@ static void filter_closest(const struct RTCFilterFunctionNArguments *arguments)
 
 // Returns true if the crossed triangle lets some light pass, and accounts for it. A ray through the edge that two triangles share hits
 // both: within one mesh, hits on edges at the same distance are one crossing.
-static bool cross(const lx_accel *accel, crossing *state, unsigned mesh, unsigned triangle, float u, float v, float t)
+static bool cross(const lx_accel *accel, crossing *state, crossed seen[remembered_triangles], unsigned mesh, unsigned triangle, float u, float v, float t)
 {
     const bool on_edge = lx_min(lx_min(u, v), 1 - u - v) < 0x1p-16f;
     for (uint32_t k = 0; k < state->count; ++k) {
-        if (state->seen[k].mesh != mesh) continue;
-        if (state->seen[k].triangle == triangle) return true;
-        if (on_edge && state->seen[k].edge_t >= 0 && fabsf(state->seen[k].edge_t - t) <= 0x1p-20f * t) return true;
+        if (seen[k].mesh != mesh) continue;
+        if (seen[k].triangle == triangle) return true;
+        if (on_edge && seen[k].edge_t >= 0 && fabsf(seen[k].edge_t - t) <= 0x1p-20f * t) return true;
     }
     const lx_rgb passed = accel->queries.transmittance(accel->queries.user, mesh, triangle, u, v);
     if (lx_rgb_is_black(passed)) return false;
@@ -100,10 +106,7 @@ static bool cross(const lx_accel *accel, crossing *state, unsigned mesh, unsigne
         state->overflow = true;
         return true;
     }
-    state->seen[state->count].mesh = mesh;
-    state->seen[state->count].triangle = triangle;
-    state->seen[state->count].edge_t = on_edge ? t : -1;
-    ++state->count;
+    seen[state->count++] = (crossed){mesh, triangle, on_edge ? t : -1};
     state->transmittance = lx_rgb_mul(state->transmittance, passed);
     return true;
 }
@@ -113,7 +116,8 @@ static void filter_occluded(const struct RTCFilterFunctionNArguments *arguments)
     const ray_context *context = (const ray_context *)arguments->context;
     for (unsigned i = 0; i < arguments->N; ++i) {
         if (arguments->valid[i] != -1) continue;
-        if (cross(context->accel, &context->crossings[ray_id(arguments, i)], hit_mesh(arguments, i),
+        const unsigned ray = ray_id(arguments, i);
+        if (cross(context->accel, &context->crossings[ray], context->seen[ray], hit_mesh(arguments, i),
                   hit_triangle(arguments, i), hit_u(arguments, i), hit_v(arguments, i), hit_t(arguments, i)))
             arguments->valid[i] = 0;
     }
@@ -218,18 +222,28 @@ const char *lx_accel_isa(const lx_accel *accel)
     return accel->isa;
 }
 
-static ray_context make_context(const lx_accel *accel, crossing *crossings)
+static ray_context make_context(const lx_accel *accel)
 {
-    ray_context context = {.accel = accel, .crossings = crossings};
+    ray_context context = {.accel = accel};
     rtcInitIntersectContext(&context.embree);
     return context;
 }
 
-static struct RTCRay make_ray(const lx_ray *ray, unsigned id)
+// Field by field into its place: a ray that is copied as a whole right after waits until all its fields are written.
+static void set_ray(struct RTCRay *to, const lx_ray *ray, unsigned id)
 {
-    return (struct RTCRay){.org_x = ray->origin.x, .org_y = ray->origin.y, .org_z = ray->origin.z, .tnear = ray->t_min,
-                           .dir_x = ray->direction.x, .dir_y = ray->direction.y, .dir_z = ray->direction.z,
-                           .tfar = ray->t_max, .mask = 0xffffffffu, .id = id};
+    to->org_x = ray->origin.x;
+    to->org_y = ray->origin.y;
+    to->org_z = ray->origin.z;
+    to->tnear = ray->t_min;
+    to->dir_x = ray->direction.x;
+    to->dir_y = ray->direction.y;
+    to->dir_z = ray->direction.z;
+    to->time = 0;
+    to->tfar = ray->t_max;
+    to->mask = 0xffffffffu;
+    to->id = id;
+    to->flags = 0;
 }
 
 // Embree's Ng follows the corners' order by the right hand, as glTF's front side does, but for mirrored instances.
@@ -240,7 +254,8 @@ static bool is_back(const lx_accel *accel, unsigned mesh, float along_normal)
 
 static lx_hit intersect_one(const lx_accel *accel, ray_context *context, const lx_ray *ray)
 {
-    struct RTCRayHit query = {.ray = make_ray(ray, 0)};
+    struct RTCRayHit query;
+    set_ray(&query.ray, ray, 0);
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
     rtcIntersect1(accel->scene, &context->embree, &query);
@@ -285,7 +300,7 @@ static void intersect_packet(const lx_accel *accel, ray_context *context, const 
 
 void lx_accel_closest(const lx_accel *accel, const lx_ray *rays, lx_hit *hits, size_t count)
 {
-    ray_context context = make_context(accel, NULL);
+    ray_context context = make_context(accel);
     for (size_t i = 0; i < count; i += packet_size) {
         const size_t left = count - i;
         if (left == 1)
@@ -298,7 +313,7 @@ void lx_accel_closest(const lx_accel *accel, const lx_ray *rays, lx_hit *hits, s
 // Exact for any number of surfaces: one closest hit after the other.
 static lx_rgb walk_transmittance(const lx_accel *accel, lx_ray ray)
 {
-    ray_context context = make_context(accel, NULL);
+    ray_context context = make_context(accel);
     lx_rgb product = {1, 1, 1};
     lx_hit last = {.surface = LX_MISS};
     for (;;) {
@@ -316,17 +331,15 @@ static lx_rgb walk_transmittance(const lx_accel *accel, lx_ray ray)
 void lx_accel_transmittance(const lx_accel *accel, const lx_ray *rays, lx_rgb *transmittance, size_t count)
 {
     crossing crossings[batch_size];
+    crossed seen[batch_size][remembered_triangles];
     struct RTCRay queries[batch_size];
     for (size_t first = 0; first < count; first += batch_size) {
         const size_t batch = count - first < batch_size ? count - first : (size_t)batch_size;
-        for (size_t i = 0; i < batch; ++i) queries[i] = make_ray(&rays[first + i], (unsigned)i);
-        if (accel->any_filter)
-            for (size_t i = 0; i < batch; ++i) {
-                crossings[i].transmittance = (lx_rgb){1, 1, 1};
-                crossings[i].count = 0;
-                crossings[i].overflow = false;
-            }
-        ray_context context = make_context(accel, crossings);
+        for (size_t i = 0; i < batch; ++i) set_ray(&queries[i], &rays[first + i], (unsigned)i);
+        for (size_t i = 0; accel->any_filter && i < batch; ++i) crossings[i] = (crossing){.transmittance = {1, 1, 1}};
+        ray_context context = make_context(accel);
+        context.crossings = crossings;
+        context.seen = seen;
         rtcOccluded1M(accel->scene, &context.embree, queries, (unsigned)batch, sizeof(struct RTCRay));
         for (size_t i = 0; i < batch; ++i) {
             if (queries[i].tfar < 0)

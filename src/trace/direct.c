@@ -20,6 +20,8 @@
 
 #include "base/memory.h"
 #include "math/sobol.h"
+#include "trace/light_sample.h"
+#include "trace/source_view.h"
 #include "trace/tracer_data.h"
 
 #include <string.h>
@@ -44,9 +46,10 @@ static const float darkest = 0.01f; // of the mean light of the source: what is 
 // Looks of equal weight that must agree in a luxel and its neighbours: what they miss is a share of the source below its inverse, mostly.
 static const float enough_looks = 20, enough_own_looks = 6; // the latter of the 16 that a luxel with doubts takes
 
-// One of a luxel's first samples: what would arrive, and what share of it does.
+// One of a luxel's first samples: what would arrive, from where, and what share of it does.
 typedef struct look {
     lx_rgb light, transmittance;
+    lx_vec3 direction;
     uint32_t cell;
     bool arrives; // else the receiver or the source turns away
 } look;
@@ -74,6 +77,7 @@ struct lx_direct_batch {
     uint8_t run[ray_batch];
     uint64_t ray_count;
     lx_source_view view;
+    lx_view_samples samples;
     // Per luxel of a chunk and cell.
     lx_rgb *sums;
     float (*run_sums)[runs]; // mean of the channels
@@ -95,7 +99,6 @@ typedef struct job {
     uint32_t first_samples; // of which so many come first, then four times as many, and so on
     bool is_sharp, is_uniform_sky;
     bool is_beside; // nearness may be more than 1
-    bool has_views;
     uint32_t viewed; // luxel that the view is of; most_luxels: none yet
     spread even, shadowed; // of luxels whose shadows are known, and of others
     float noise, least; // standard error wanted, of the light or of `least`
@@ -246,22 +249,44 @@ static uint32_t most_samples(const job *j, uint32_t luxel)
     return j->samples / j->weight * weight_at(j, luxel) * nearness(j, luxel);
 }
 
-// The first samples ask the source itself, further ones a view of it: most luxels that it reaches take enough of them for that.
-static bool take_sample(job *j, uint32_t luxel, uint32_t i, lx_ray *ray, lx_rgb *light, uint32_t *cell)
+static void see(job *j, uint32_t luxel)
 {
-    const lx_receiver *sites = &j->tile->sites[(size_t)luxel * lx_direct_sites], *site = &sites[i % lx_direct_sites];
-    if (lx_source_bound(j->tracer, j->source, site) == 0) return false;
-    j->b->luxels[luxel].possible = true;
-    const lx_vec2 u = lx_sobol_pair(i, lx_hash_combine(j->tile->stream[luxel], j->key));
-    const uint32_t weight = j->tile->alone && j->tile->alone[luxel] ? 0 : weight_at(j, luxel);
-    if (j->is_uniform_sky) {
-        *cell = 0;
-        return lx_sample_uniform_sky(j->tracer, site, u, weight, ray, light);
-    }
-    if (!j->has_views || i < probes) return lx_sample_source(j->tracer, j->source, site, u, weight, ray, light, cell);
-    if (j->viewed != luxel) lx_source_view_fill(&j->b->view, j->tracer, j->source, sites, lx_direct_sites);
+    if (j->viewed == luxel) return;
+    lx_source_view_fill(&j->b->view, j->tracer, j->source, &j->tile->sites[(size_t)luxel * lx_direct_sites]);
     j->viewed = luxel;
-    return lx_source_view_sample(&j->b->view, i % lx_direct_sites, u, weight, ray, light, cell);
+}
+
+static uint32_t key_at(const job *j, uint32_t luxel)
+{
+    return lx_hash_combine(j->tile->stream[luxel], j->key);
+}
+
+// Against a luxel's gather rays.
+static uint32_t count_at(const job *j, uint32_t luxel)
+{
+    return j->tile->alone && j->tile->alone[luxel] ? 0 : weight_at(j, luxel);
+}
+
+// Sixteen of a luxel's samples, from number `first` on, a multiple of 16. False: nothing arrives.
+static bool take_samples(job *j, uint32_t luxel, uint32_t first)
+{
+    see(j, luxel);
+    if (j->b->view.reaches) lx_source_view_sample(&j->b->view, key_at(j, luxel), first, count_at(j, luxel), &j->b->samples);
+    return j->b->view.reaches;
+}
+
+// Of the latest samples.
+static lx_ray ray_of(const lx_direct_batch *b, uint32_t k)
+{
+    const lx_view_vectors *origin = &b->view.origin, *direction = &b->samples.direction;
+    return (lx_ray){.origin = {origin->x[k], origin->y[k], origin->z[k]}, .direction = {direction->x[k], direction->y[k], direction->z[k]},
+                    .t_max = b->view.t_max};
+}
+
+static bool take_sky_sample(const job *j, uint32_t luxel, uint32_t i, lx_ray *ray, lx_rgb *light)
+{
+    const lx_receiver *site = &j->tile->sites[(size_t)luxel * lx_direct_sites + i % lx_direct_sites];
+    return lx_sample_uniform_sky(j->tracer, site, lx_sobol_pair(i, key_at(j, luxel)), count_at(j, luxel), ray, light);
 }
 
 static void trace_rays(const job *j, size_t count)
@@ -302,17 +327,36 @@ static void judge(lx_direct_batch *b, uint32_t luxel)
     }
 }
 
-// Takes the listed luxels' looks up to number `end` and judges them.
+// All luxels' first samples, their rays not yet sent.
+static void prepare_looks(job *j)
+{
+    lx_direct_batch *b = j->b;
+    for (uint32_t luxel = 0; luxel < j->tile->count; ++luxel) {
+        look *looks = b->looks[luxel];
+        b->luxels[luxel].possible = take_samples(j, luxel, 0);
+        for (uint32_t i = 0; i < lx_direct_sites; ++i) {
+            looks[i].arrives = b->luxels[luxel].possible && !lx_rgb_is_black(b->samples.light[i]);
+            if (!looks[i].arrives) continue;
+            const lx_ray ray = ray_of(b, i);
+            looks[i].light = b->samples.light[i];
+            looks[i].direction = ray.direction;
+            looks[i].cell = b->samples.cell[i];
+        }
+    }
+}
+
+// Sends the rays of the listed luxels' looks up to number `end` and judges them.
 static void look_at(job *j, const uint16_t *list, uint32_t list_count, uint32_t end)
 {
     lx_direct_batch *b = j->b;
     size_t count = 0;
     for (uint32_t k = 0; k < list_count; ++k) {
         luxel_state *s = &b->luxels[list[k]];
+        const lx_receiver *sites = &j->tile->sites[(size_t)list[k] * lx_direct_sites];
         for (uint32_t i = s->looked; i < end; ++i) {
-            look *l = &b->looks[list[k]][i];
-            l->arrives = take_sample(j, list[k], i, &b->rays[count], &l->light, &l->cell);
+            const look *l = &b->looks[list[k]][i];
             if (!l->arrives) continue;
+            b->rays[count] = (lx_ray){.origin = lx_offset_origin(sites[i].position, sites[i].geometric_normal), .direction = l->direction, .t_max = b->view.t_max};
             b->owner[count++] = (uint32_t)list[k] * lx_direct_sites + i;
             if (count < ray_batch) continue;
             finish_looks(j, count);
@@ -370,6 +414,7 @@ static void look_where_it_matters(job *j)
     uint16_t around[8];
     uint32_t count = 0;
     for (uint32_t i = 0; i < j->tile->count; ++i) b->list[count++] = (uint16_t)i;
+    prepare_looks(j);
     look_at(j, b->list, count, probes);
     count = 0;
     for (uint32_t i = 0; i < j->tile->count; ++i) {
@@ -460,19 +505,19 @@ static void clear_sums(const job *j, uint32_t slots)
     memset(j->b->run_sums, 0, slots * j->cells * sizeof *j->b->run_sums);
 }
 
-// Adds samples first … end of a luxel without asking what is in their way. Those that were looked at are remembered.
+// Adds samples first … end of a luxel without asking what is in their way. The first were prepared.
 static void add_unshadowed(job *j, uint32_t luxel, uint32_t first, uint32_t end, uint32_t samples)
 {
     lx_direct_batch *b = j->b;
-    for (uint32_t i = first; i < end; ++i) {
-        lx_ray ray;
-        look fresh;
-        const look *l = &fresh;
-        if (i < b->luxels[luxel].looked)
-            l = &b->looks[luxel][i];
-        else
-            fresh.arrives = take_sample(j, luxel, i, &ray, &fresh.light, &fresh.cell);
-        if (l->arrives) add_to(b, l->cell, i * runs / samples, l->light);
+    for (uint32_t i = first; i < end;) {
+        const uint32_t block = i / lx_direct_sites * lx_direct_sites, block_end = block + lx_direct_sites < end ? block + lx_direct_sites : end;
+        if (block > 0) take_samples(j, luxel, block);
+        for (; i < block_end; ++i) {
+            const uint32_t k = i - block;
+            const look *l = &b->looks[luxel][k];
+            if (block == 0 && l->arrives) add_to(b, l->cell, i * runs / samples, l->light);
+            if (block > 0 && !lx_rgb_is_black(b->samples.light[k])) add_to(b, b->samples.cell[k], i * runs / samples, b->samples.light[k]);
+        }
     }
 }
 
@@ -521,29 +566,60 @@ static void finish_sums(const job *j, size_t count)
         add_to(j->b, j->b->owner[k], j->b->run[k], lx_rgb_mul(j->b->light[k], j->b->transmittance[k]));
 }
 
+typedef struct queue {
+    size_t count; // of rays
+    uint32_t slot, end; // of the samples that are added
+} queue;
+
+static void send(job *j, queue *q, const lx_ray *ray, lx_rgb light, uint32_t cell, uint32_t i)
+{
+    lx_direct_batch *b = j->b;
+    b->rays[q->count] = *ray;
+    b->light[q->count] = light;
+    b->owner[q->count] = q->slot * j->cells + cell;
+    b->run[q->count] = (uint8_t)(i * runs / q->end);
+    if (++q->count < ray_batch) return;
+    finish_sums(j, q->count);
+    q->count = 0;
+}
+
+// Rays of a luxel's samples first … end.
+static void send_samples(job *j, queue *q, uint32_t luxel, uint32_t first, uint32_t end)
+{
+    lx_direct_batch *b = j->b;
+    lx_ray ray;
+    for (uint32_t i = first; j->is_uniform_sky && i < end; ++i) {
+        lx_rgb light;
+        if (take_sky_sample(j, luxel, i, &ray, &light)) send(j, q, &ray, light, 0, i);
+    }
+    for (uint32_t i = first; !j->is_uniform_sky && i < end;) {
+        const uint32_t block = i / lx_direct_sites * lx_direct_sites, block_end = block + lx_direct_sites < end ? block + lx_direct_sites : end;
+        if (!take_samples(j, luxel, block)) return;
+        for (; i < block_end; ++i) {
+            const uint32_t k = i - block;
+            if (lx_rgb_is_black(b->samples.light[k])) continue;
+            ray = ray_of(b, k);
+            send(j, q, &ray, b->samples.light[k], b->samples.cell[k], i);
+        }
+    }
+}
+
 // Rays of the listed slots' samples up to number `end`; the first `done` were taken before, or looked at.
 static void sum_samples(job *j, const uint16_t *list, const uint8_t *slots, uint32_t slot_count, uint32_t done, uint32_t end)
 {
     lx_direct_batch *b = j->b;
-    size_t count = 0;
+    queue q = {.end = end};
     for (uint32_t s = 0; s < slot_count; ++s) {
-        const uint32_t slot = slots[s], luxel = list[slot];
+        const uint32_t luxel = list[slots[s]];
         uint32_t first = done;
+        q.slot = slots[s];
         for (; first < b->luxels[luxel].looked; ++first) {
             const look *l = &b->looks[luxel][first];
-            if (l->arrives) add_to(b, slot * j->cells + l->cell, first * runs / end, lx_rgb_mul(l->light, l->transmittance));
+            if (l->arrives) add_to(b, q.slot * j->cells + l->cell, first * runs / end, lx_rgb_mul(l->light, l->transmittance));
         }
-        for (uint32_t i = first; i < end; ++i) {
-            uint32_t cell;
-            if (!take_sample(j, luxel, i, &b->rays[count], &b->light[count], &cell)) continue;
-            b->owner[count] = slot * j->cells + cell;
-            b->run[count] = (uint8_t)(i * runs / end);
-            if (++count < ray_batch) continue;
-            finish_sums(j, count);
-            count = 0;
-        }
+        send_samples(j, &q, luxel, first, end);
     }
-    finish_sums(j, count);
+    finish_sums(j, q.count);
 }
 
 static bool is_sure(const job *j, uint32_t slot, uint32_t samples)
@@ -591,7 +667,6 @@ bool lx_direct_light(lx_direct_batch *b, const lx_direct_settings *settings, con
     j.samples = j.is_sharp ? (uint32_t)lx_direct_sites : settings->samples * j.weight;
     j.first_samples = j.samples;
     j.is_beside = may_be_beside(&j);
-    j.has_views = lx_source_has_views(tracer, source);
     j.is_uniform_sky = is_uniform_sky(tracer, source);
     j.viewed = most_luxels;
     j.noise = settings->noise;

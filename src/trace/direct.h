@@ -6,7 +6,7 @@
 #ifndef LX_TRACE_DIRECT_H
 #define LX_TRACE_DIRECT_H
 
-#include "trace/light_sample.h"
+#include "trace/tracer.h"
 
 enum { lx_direct_sites = 16 }; ///< Receivers per luxel.
 

@@ -6,6 +6,7 @@
 #include "trace/emitters.h"
 
 #include "base/error.h"
+#include "base/memory.h"
 #include "trace/sampling.h"
 #include "trace/tracer_data.h"
 
@@ -115,11 +116,11 @@ static void build_piece_guide(const float *cdf, uint32_t count, uint16_t *guide)
 
 // Fills the piece table of one triangle; returns its mean brightness.
 static lx_result build_pieces(const lx_tracer *tracer, lx_emitters *emitters, size_t *capacity, lx_emitter_triangle *t,
-                              uint32_t lookups, float *out_mean, lx_error *error)
+                              lx_emitter_place place, uint32_t lookups, float *out_mean, lx_error *error)
 {
     const uint32_t n = t->grid;
     if (n == 1) {
-        *out_mean = mean_brightness(tracer, t->surface, t->triangle, 1, 0, 0, 0, lookups);
+        *out_mean = mean_brightness(tracer, place.surface, place.triangle, 1, 0, 0, 0, lookups);
         return LX_OK;
     }
     const uint32_t entries = n * n;
@@ -134,7 +135,7 @@ static lx_result build_pieces(const lx_tracer *tracer, lx_emitters *emitters, si
     for (uint32_t e = 0; e < entries; ++e) {
         uint32_t i, j, k;
         piece_of_number(n, e, &i, &j, &k);
-        cdf[e + 1] = mean_brightness(tracer, t->surface, t->triangle, n, i, j, k, lookups);
+        cdf[e + 1] = mean_brightness(tracer, place.surface, place.triangle, n, i, j, k, lookups);
         sum += (double)cdf[e + 1];
     }
     const double mean = sum / (double)entries;
@@ -152,18 +153,13 @@ static lx_result build_pieces(const lx_tracer *tracer, lx_emitters *emitters, si
     return LX_OK;
 }
 
-static lx_result add_surface(lx_tracer *tracer, lx_emitters *emitters, size_t *triangle_capacity, size_t piece_capacity[2],
-                             uint32_t surface, lx_error *error)
+static lx_result add_surface(lx_tracer *tracer, lx_emitters *emitters, size_t piece_capacity[2], uint32_t surface, lx_error *error)
 {
     const lx_primitive *primitive = &tracer->scene->primitives[tracer->scene->surfaces[surface].primitive];
     const lx_material *material = &tracer->scene->materials[tracer->scene->surfaces[surface].material];
     const bool white = material->emissive_texture.texture < 0 || lx_surface_is_told_by_cell(tracer, surface);
     const bool plain = white && tracer->surfaces[surface].kind == LX_SURFACE_OPAQUE;
     const size_t first = emitters->triangle_count;
-    if (first + primitive->triangle_count > UINT32_MAX ||
-        !lx_array_reserve(&emitters->triangles, triangle_capacity, first + primitive->triangle_count,
-                          sizeof *emitters->triangles))
-        return lx_fail_memory(error, "emitters");
     tracer->surfaces[surface].first_emitter_triangle = (uint32_t)first;
     emitters->triangle_count += primitive->triangle_count;
     for (uint32_t i = 0; i < primitive->triangle_count; ++i) {
@@ -171,15 +167,16 @@ static lx_result add_surface(lx_tracer *tracer, lx_emitters *emitters, size_t *t
         lx_vec3 p[3];
         lx_triangle_corners(tracer, surface, i, p);
         *t = (lx_emitter_triangle){.origin = p[0], .edge1 = lx_sub(p[1], p[0]), .edge2 = lx_sub(p[2], p[0]), .plain = plain,
-                                   .double_sided = lx_surface_is_double_sided(tracer, surface), .surface = surface, .triangle = i};
+                                   .double_sided = lx_surface_is_double_sided(tracer, surface)};
+        emitters->places[first + i] = (lx_emitter_place){surface, i};
         const lx_vec3 cross = lx_scale(lx_cross(t->edge1, t->edge2), tracer->surfaces[surface].orientation);
         t->normal = lx_normalize_or(cross, (lx_vec3){0, 0, 0});
         t->area = 0.5f * lx_length(cross);
         const float texels = t->area > 0 ? texels_across(tracer, surface, i) : 0;
-        t->grid = choose_grid(texels, primitive->triangle_count);
+        t->grid = (uint8_t)choose_grid(texels, primitive->triangle_count);
         const uint32_t lookups = choose_lookups(texels, t->grid, primitive->triangle_count);
         float mean = 0;
-        const lx_result result = build_pieces(tracer, emitters, piece_capacity, t, lookups, &mean, error);
+        const lx_result result = build_pieces(tracer, emitters, piece_capacity, t, emitters->places[first + i], lookups, &mean, error);
         if (result != LX_OK) return result;
         t->probability = mean * t->area; // power for now; divided by the source's below
     }
@@ -198,7 +195,7 @@ static lx_result build_tree(const lx_tracer *tracer, lx_emitters *emitters, uint
         if (!(t->probability > 0)) continue;
         lx_light_leaf *leaf = &leaves[count++];
         *leaf = (lx_light_leaf){.normal = t->normal, .power = t->probability, .both_sides = t->double_sided, .triangle = i};
-        lx_triangle_corners(tracer, t->surface, t->triangle, leaf->corner);
+        lx_triangle_corners(tracer, emitters->places[i].surface, emitters->places[i].triangle, leaf->corner);
     }
     if (count <= most_without_tree) return LX_OK;
     return lx_light_tree_add(&emitters->tree, leaves, count, &emitters->roots[source], error);
@@ -218,11 +215,32 @@ static lx_result build_trees(const lx_tracer *tracer, lx_emitters *emitters, lx_
     return result;
 }
 
+// The source's surfaces that are traced shine.
+static bool shines(const lx_tracer *tracer, uint32_t surface, uint32_t source)
+{
+    return tracer->scene->surfaces[surface].source == (int32_t)source && tracer->surfaces[surface].positions;
+}
+
+static lx_result make_room(const lx_tracer *tracer, lx_emitters *emitters, lx_error *error)
+{
+    const lx_scene *scene = tracer->scene;
+    size_t count = 0;
+    for (uint32_t s = 0; s < scene->surface_count; ++s) {
+        const int32_t source = scene->surfaces[s].source;
+        if (source >= 0 && shines(tracer, s, (uint32_t)source)) count += scene->primitives[scene->surfaces[s].primitive].triangle_count;
+    }
+    if (count <= UINT32_MAX) emitters->triangles = lx_malloc_array(count, sizeof *emitters->triangles);
+    if (count <= UINT32_MAX) emitters->places = lx_malloc_array(count, sizeof *emitters->places);
+    return emitters->triangles && emitters->places ? LX_OK : lx_fail_memory(error, "emitters");
+}
+
 lx_result lx_emitters_build(lx_tracer *tracer, lx_error *error)
 {
     const lx_scene *scene = tracer->scene;
     lx_emitters *emitters = &tracer->emitters;
-    size_t triangle_capacity = 0, piece_capacity[2] = {0, 0};
+    size_t piece_capacity[2] = {0, 0};
+    lx_result result = make_room(tracer, emitters, error);
+    if (result != LX_OK) return result;
     emitters->first_triangle = lx_calloc_array((size_t)scene->source_count + 1, sizeof(uint32_t));
     emitters->source_power = lx_calloc_array(scene->source_count, sizeof(float));
     if (!emitters->first_triangle || !emitters->source_power) return lx_fail_memory(error, "emitters");
@@ -230,8 +248,8 @@ lx_result lx_emitters_build(lx_tracer *tracer, lx_error *error)
         emitters->first_triangle[source] = (uint32_t)emitters->triangle_count;
         if (scene->sources[source].kind != LX_SOURCE_EMISSIVE) continue;
         for (uint32_t s = 0; s < scene->surface_count; ++s) {
-            if (scene->surfaces[s].source != (int32_t)source || !tracer->surfaces[s].positions) continue;
-            const lx_result result = add_surface(tracer, emitters, &triangle_capacity, piece_capacity, s, error);
+            if (!shines(tracer, s, source)) continue;
+            result = add_surface(tracer, emitters, piece_capacity, s, error);
             if (result != LX_OK) return result;
         }
     }
@@ -260,6 +278,7 @@ lx_result lx_emitters_build(lx_tracer *tracer, lx_error *error)
 void lx_emitters_release(lx_emitters *emitters)
 {
     lx_free(emitters->triangles);
+    lx_free(emitters->places);
     lx_free(emitters->triangle_cdf);
     lx_free(emitters->piece_cdf);
     lx_free(emitters->triangle_guide);
@@ -280,32 +299,26 @@ static uint32_t find_step(const float *cdf, uint32_t low, uint32_t count, float 
     return low;
 }
 
-// A triangle of a source for a viewer, and how probable it was; u becomes its place within the choice.
-static const lx_emitter_triangle *choose_triangle(const lx_emitters *emitters, uint32_t source, const lx_light_table *table, bool by_power, lx_vec3 viewer,
-                                                  float *u, float *probability)
+uint32_t lx_emitters_choose(const lx_emitters *emitters, uint32_t source, bool by_power, lx_vec3 viewer, float *u, float *probability)
 {
     uint32_t index;
-    if (table) return lx_light_table_sample(table, &emitters->tree, viewer, u, &index, probability) ? &emitters->triangles[index] : NULL;
     if (!by_power && lx_emitters_has_tree(emitters, source))
-        return lx_light_tree_sample(&emitters->tree, emitters->roots[source].root, viewer, u, &index, probability) ? &emitters->triangles[index] : NULL;
+        return lx_light_tree_sample(&emitters->tree, emitters->roots[source].root, viewer, u, &index, probability) ? index : LX_NO_EMITTER;
     const uint32_t first = emitters->first_triangle[source], count = emitters->first_triangle[source + 1] - first;
     const float *cdf = emitters->triangle_cdf + first + source;
-    if (count == 0 || !(cdf[count] > 0)) return NULL;
+    if (count == 0 || !(cdf[count] > 0)) return LX_NO_EMITTER;
     const uint32_t *guide = emitters->triangle_guide + first + source;
-    const lx_emitter_triangle *t = &emitters->triangles[first + find_step(cdf, guide[(uint32_t)(*u * (float)count)], count, u)];
-    *probability = t->probability;
-    return t->probability > 0 ? t : NULL;
+    index = first + find_step(cdf, guide[(uint32_t)(*u * (float)count)], count, u);
+    *probability = emitters->triangles[index].probability;
+    return *probability > 0 ? index : LX_NO_EMITTER;
 }
 
-// A plain triangle so near the viewer that cosine and distance differ a lot over it is sampled by solid angle. False: by area.
+// A plain triangle that is near. False: by area.
 static bool see_triangle(const lx_emitter_triangle *t, lx_vec3 viewer, lx_spherical_triangle *out)
 {
-    static const float near_areas = 16; // square of the distance over the area
     static const float least_angle = 1e-3f, most_angle = 3; // below, precision ends; above, cosine-weighted rays do better
-    if (t->grid != 1) return false;
     const lx_vec3 a = lx_sub(t->origin, viewer), corner[3] = {a, lx_add(a, t->edge1), lx_add(a, t->edge2)};
-    const lx_vec3 centre = lx_mad(a, lx_add(t->edge1, t->edge2), 1.0f / 3);
-    if (!(lx_dot(centre, centre) < near_areas * t->area)) return false;
+    if (t->grid != 1 || !lx_emitter_is_near(a, t->edge1, t->edge2, t->area)) return false;
     *out = lx_spherical_triangle_of(corner);
     return out->solid_angle > least_angle && out->solid_angle < most_angle;
 }
@@ -329,13 +342,26 @@ static float angle_per_area(const lx_emitter_triangle *t, lx_vec3 viewer, float 
     return distance2 > 0 ? fabsf(lx_dot(t->normal, to_point)) / (distance2 * sqrtf(distance2)) : 0;
 }
 
-bool lx_emitters_sample(const lx_emitters *emitters, uint32_t source, const lx_light_table *table, bool by_power, lx_vec3 viewer, lx_vec2 u,
-                        lx_emitter_sample *out)
+bool lx_emitters_sample(const lx_emitters *emitters, uint32_t source, bool by_power, lx_vec3 viewer, lx_vec2 u, lx_emitter_sample *out)
 {
     float probability;
-    const lx_emitter_triangle *t = choose_triangle(emitters, source, table, by_power, viewer, &u.x, &probability);
-    if (!t) return false;
-    *out = (lx_emitter_sample){.triangle = t, .pdf_area = probability / t->area};
+    const uint32_t index = lx_emitters_choose(emitters, source, by_power, viewer, &u.x, &probability);
+    return index != LX_NO_EMITTER && lx_emitters_locate(emitters, index, probability, viewer, u, out);
+}
+
+void lx_emitters_prefetch(const lx_emitters *emitters, uint32_t index, float u)
+{
+    const lx_emitter_triangle *t = &emitters->triangles[index];
+    const uint32_t entries = (uint32_t)t->grid * t->grid, guess = t->first_cdf + (uint32_t)(u * (float)entries);
+    if (t->grid == 1) return;
+    LX_PREFETCH(&emitters->piece_guide[guess]);
+    LX_PREFETCH(&emitters->piece_cdf[guess]); // where brightness is even, the step is close by
+}
+
+bool lx_emitters_locate(const lx_emitters *emitters, uint32_t index, float probability, lx_vec3 viewer, lx_vec2 u, lx_emitter_sample *out)
+{
+    const lx_emitter_triangle *t = &emitters->triangles[index];
+    *out = (lx_emitter_sample){.index = index, .pdf_area = probability / t->area};
     lx_spherical_triangle seen;
     if (see_triangle(t, viewer, &seen)) {
         const lx_vec2 b = meet_triangle(t, viewer, lx_sample_spherical_triangle(&seen, u));

@@ -24,26 +24,10 @@ bool lx_sample_uniform_sky(const lx_tracer *tracer, const lx_receiver *receiver,
 /// Weight of a cosine-weighted ray that met a uniform sky, against `count` samples of lx_sample_uniform_sky; 1 without any.
 float lx_uniform_sky_weight(uint32_t count);
 
-enum { lx_view_receivers = 16 };
-
-/// What many samples of one source from receivers close together share.
-typedef struct lx_source_view {
-    const lx_tracer *tracer;
-    uint32_t source;
-    const lx_receiver *receivers;
-    bool dark;      ///< Certainly nothing reaches any of them.
-    bool has_table; ///< `table` and `alone` hold.
-    bool alone[lx_view_receivers]; ///< Samples bring all light; else hits have a share of it.
-    lx_light_table table;
-} lx_source_view;
-
-/// Does a view of the source differ from asking it each time?
-bool lx_source_has_views(const lx_tracer *tracer, uint32_t source);
-/// Looks at a source from `count` receivers, at most lx_view_receivers. Worth it for a dozen samples or more.
-void lx_source_view_fill(lx_source_view *view, const lx_tracer *tracer, uint32_t source, const lx_receiver *receivers, uint32_t count);
-/// The same estimate as lx_sample_source by other samples, of a receiver that the view was filled with.
-bool lx_source_view_sample(const lx_source_view *view, uint32_t receiver, lx_vec2 u, uint32_t count, lx_ray *out_ray, lx_rgb *out_irradiance,
-                           uint32_t *out_cell);
+/// Is the source so small, seen from where rays start, that samples alone bring its light? A matter of the source and the place.
+bool lx_has_samples_alone(const lx_tracer *tracer, uint32_t source, lx_vec3 origin);
+/// Certainly so, whatever lies at least `nearest` metres from its sphere.
+bool lx_source_is_small(const lx_tracer *tracer, uint32_t source, float nearest);
 
 /// A cheap upper estimate of the irradiance that a source of strength 1 can give a receiver: 0 if it certainly gives none (below the horizon, outside
 /// the cone or the range, behind a one-sided lamp), infinity if nothing is known. Within the source's own bounds it is infinity too.
@@ -59,9 +43,11 @@ float lx_hit_weight(const lx_tracer *tracer, const lx_ray *ray, const lx_hit *hi
 /// The same for a ray that left the scene, against one sample. `direction` is unit. A uniform sky: 1.
 float lx_sky_weight(const lx_tracer *tracer, lx_vec3 direction, float cosine);
 
-/// Smooth cut-off at a light's range (KHR_lights_punctual): clamp(1 - (d / range)^4, 0, 1); range 0: 1.
-float lx_range_factor(float distance, float range);
-/// KHR_lights_punctual's angular attenuation of a spot, squared. `cosine`: between the spot's axis and the direction to the receiver.
-float lx_spot_factor(const lx_light *light, float cosine);
+/// The power heuristic of Veach 1997, section 9.2.4.
+LX_INLINED float lx_power_heuristic(float pdf_a, float pdf_b)
+{
+    const float a = pdf_a * pdf_a, b = pdf_b * pdf_b;
+    return (a + b > 0) & (a < INFINITY) ? a / (a + b) : 1;
+}
 
 #endif

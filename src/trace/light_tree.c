@@ -3,7 +3,15 @@
 #include "base/error.h"
 #include "base/memory.h"
 
+#include <string.h>
+
 enum { width = lx_light_tree_width, buckets = 12 };
+
+// Of triangle i of a bin, of the leaf's power.
+static inline float share_in(const lx_light_bin *bin, uint32_t i)
+{
+    return lx_min(bin->until[i], 1) - (i > 0 ? bin->until[i - 1] : 0);
+}
 
 // ---- construction --------------------------------------------------------------------------------------------------------------
 
@@ -129,20 +137,36 @@ static void bound_child(lx_light_node *node, uint32_t child, const lx_light_leaf
     node->power[child] = all.power;
 }
 
-static lx_result add_order(lx_light_tree *tree, const lx_light_leaf *leaves, uint32_t count, uint32_t place, lx_error *error)
+// Bins begin at cache lines, which lx_array_reserve knows nothing of.
+static bool reserve_bin(lx_light_tree *tree)
 {
-    const size_t end = tree->order_count + count;
-    if (end > UINT32_MAX || !lx_array_reserve(&tree->order, &tree->order_capacity[0], end, sizeof *tree->order) ||
-        !lx_array_reserve(&tree->share, &tree->order_capacity[1], end, sizeof *tree->share))
-        return lx_fail_memory(error, "light tree");
-    double power = 0;
+    if (tree->bin_count < tree->bin_capacity) return true;
+    const size_t capacity = tree->bin_capacity + tree->bin_capacity / 2 + 16;
+    lx_light_bin *bins = lx_malloc_array(capacity, sizeof *bins);
+    if (!bins) return false;
+    if (tree->bin_count > 0) memcpy(bins, tree->bins, tree->bin_count * sizeof *bins);
+    lx_free(tree->bins);
+    tree->bins = bins;
+    tree->bin_capacity = capacity;
+    return true;
+}
+
+static lx_result add_bin(lx_light_tree *tree, const lx_light_leaf *leaves, uint32_t count, uint32_t place, lx_error *error)
+{
+    if (tree->bin_count >= UINT32_MAX || !reserve_bin(tree)) return lx_fail_memory(error, "light tree");
+    lx_light_bin *bin = &tree->bins[tree->bin_count++];
+    double power = 0, running = 0;
     for (uint32_t i = 0; i < count; ++i) power += (double)leaves[i].power;
+    for (uint32_t i = 0; i < lx_light_leaf_size; ++i) {
+        bin->until[i] = 2;
+        bin->triangle[i] = leaves[i < count ? i : count - 1].triangle;
+        if (i + 1 >= count) continue;
+        running += (double)leaves[i].power;
+        bin->until[i] = (float)(running / power);
+    }
     for (uint32_t i = 0; i < count; ++i) {
-        const float share = (float)((double)leaves[i].power / power);
-        tree->order[tree->order_count] = leaves[i].triangle;
-        tree->share[tree->order_count++] = share;
         tree->place[leaves[i].triangle] = place;
-        tree->share_of[leaves[i].triangle] = share;
+        tree->share_of[leaves[i].triangle] = share_in(bin, i);
     }
     return LX_OK;
 }
@@ -171,9 +195,9 @@ static lx_result add_node(lx_light_tree *tree, lx_light_leaf *leaves, uint32_t c
         bound_child(&tree->nodes[number], k, leaves + begin[k], size);
         lx_result result;
         if (size <= lx_light_leaf_size) {
-            tree->nodes[number].first[k] = (uint32_t)tree->order_count;
-            tree->nodes[number].count[k] = size;
-            result = add_order(tree, leaves + begin[k], size, width * number + k, error);
+            tree->nodes[number].first[k] = (uint32_t)tree->bin_count;
+            tree->nodes[number].is_leaf[k] = true;
+            result = add_bin(tree, leaves + begin[k], size, width * number + k, error);
         } else {
             uint32_t child;
             result = add_node(tree, leaves + begin[k], size, width * number + k, &child, error);
@@ -186,61 +210,75 @@ static lx_result add_node(lx_light_tree *tree, lx_light_leaf *leaves, uint32_t c
 
 static bool is_inner(const lx_light_node *n, uint32_t child)
 {
-    return n->power[child] > 0 && n->count[child] == 0;
+    return n->power[child] > 0 && !n->is_leaf[child];
 }
 
-// Nodes from the root downwards, breadth first, each as its leaves and its children's nodes, as far as `most` parts go (and
-// for a moment one more).
+static void copy_cluster(const lx_light_node *n, uint32_t child, lx_light_block *to, uint32_t k)
+{
+    to->x[k] = n->x[child];
+    to->y[k] = n->y[child];
+    to->z[k] = n->z[child];
+    to->radius[k] = n->radius[child];
+    to->radius2[k] = n->radius2[child];
+    to->axis_x[k] = n->axis_x[child];
+    to->axis_y[k] = n->axis_y[child];
+    to->axis_z[k] = n->axis_z[child];
+    to->cos_cone[k] = n->cos_cone[child];
+    to->sin_cone[k] = n->sin_cone[child];
+    to->both_sides[k] = n->both_sides[child];
+    to->power[k] = n->power[child];
+    to->first[k] = n->first[child];
+    to->is_leaf[k] = n->is_leaf[child];
+}
+
+// Clusters from the root downwards, breadth first: one after the other gives way to its children, while at most `most` blocks of them are needed.
 static lx_result add_cut(lx_light_tree *tree, uint32_t root, uint32_t most, lx_light_cut *out, lx_error *error)
 {
-    if (tree->part_count + most + 1 > UINT32_MAX || !lx_array_reserve(&tree->parts, &tree->part_capacity, tree->part_count + most + 1, sizeof *tree->parts))
-        return lx_fail_memory(error, "light tree");
-    lx_light_branch *parts = tree->parts + tree->part_count;
-    uint32_t count = 1, at = 0;
-    parts[0] = (lx_light_branch){root, {1, 1, 1, 1}};
-    while (at < count) {
-        const lx_light_node *n = &tree->nodes[parts[at].node];
-        uint32_t inner = 0, leaves = 0;
-        for (uint32_t k = 0; k < width; ++k) {
-            inner += is_inner(n, k);
-            leaves += n->count[k] > 0;
-        }
-        if (inner == 0) {
+    enum { room = lx_light_fine_blocks * lx_light_block_size + width };
+    uint32_t list[room], count = 0, at = 0; // clusters, as width * node + child
+    for (uint32_t k = 0; k < width; ++k)
+        if (tree->nodes[root].power[k] > 0) list[count++] = width * root + k;
+    for (uint32_t left = count; left > 0;) { // clusters that were not looked at
+        const lx_light_node *n = &tree->nodes[list[at] / width];
+        const uint32_t child = list[at] % width;
+        --left;
+        if (!is_inner(n, child)) {
             ++at;
             continue;
         }
-        if (count + inner - (leaves == 0) > most) break;
-        for (uint32_t k = 0; k < width; ++k) {
-            if (!is_inner(n, k)) continue;
-            parts[count++] = (lx_light_branch){n->first[k], {1, 1, 1, 1}};
-            parts[at].keep[k] = 0;
-        }
-        if (leaves > 0) {
-            ++at;
-            continue;
-        }
-        --count; // nothing is left of it: the others move up, in their order
-        for (uint32_t k = at; k < count; ++k) parts[k] = parts[k + 1];
+        if (count - 1 + width > most * lx_light_block_size) break;
+        const uint32_t node = n->first[child];
+        for (uint32_t k = at + 1; k < count; ++k) list[k - 1] = list[k];
+        --count;
+        for (uint32_t k = 0; k < width; ++k)
+            if (tree->nodes[node].power[k] > 0) {
+                list[count++] = width * node + k;
+                ++left;
+            }
     }
-    *out = (lx_light_cut){(uint32_t)tree->part_count, count};
-    tree->part_count += count;
+    const uint32_t blocks = (count + lx_light_block_size - 1) / lx_light_block_size;
+    if (tree->block_count + blocks > UINT32_MAX || !lx_array_reserve(&tree->blocks, &tree->block_capacity, tree->block_count + blocks, sizeof *tree->blocks))
+        return lx_fail_memory(error, "light tree");
+    *out = (lx_light_cut){(uint32_t)tree->block_count, blocks};
+    for (uint32_t b = 0; b < blocks; ++b) tree->blocks[tree->block_count++] = (lx_light_block){.power = {0}};
+    for (uint32_t i = 0; i < count; ++i)
+        copy_cluster(&tree->nodes[list[i] / width], list[i] % width, &tree->blocks[out->first + i / lx_light_block_size], i % lx_light_block_size);
     return LX_OK;
 }
 
 lx_result lx_light_tree_add(lx_light_tree *tree, lx_light_leaf *leaves, uint32_t count, lx_light_roots *out_roots, lx_error *error)
 {
     lx_result result = add_node(tree, leaves, count, LX_NO_LIGHT_NODE, &out_roots->root, error);
-    if (result == LX_OK) result = add_cut(tree, out_roots->root, lx_light_coarse_parts, &out_roots->coarse, error);
-    if (result == LX_OK) result = add_cut(tree, out_roots->root, lx_light_fine_parts, &out_roots->fine, error);
+    if (result == LX_OK) result = add_cut(tree, out_roots->root, lx_light_coarse_blocks, &out_roots->coarse, error);
+    if (result == LX_OK) result = add_cut(tree, out_roots->root, lx_light_fine_blocks, &out_roots->fine, error);
     return result;
 }
 
 void lx_light_tree_release(lx_light_tree *tree)
 {
     lx_free(tree->nodes);
-    lx_free(tree->parts);
-    lx_free(tree->order);
-    lx_free(tree->share);
+    lx_free(tree->bins);
+    lx_free(tree->blocks);
     lx_free(tree->place);
     lx_free(tree->share_of);
     *tree = (lx_light_tree){0};
@@ -251,77 +289,100 @@ static const float close_radii = 3, most_close = 0.25f;
 
 // ---- choices -------------------------------------------------------------------------------------------------------------------
 
-// Power × largest cosine at the emitters / d² ([PBR4] 12.6.3 without the receiver's cosine, so that places alone decide): angle from the cone's axis to
-// the viewer, less the cone's, less that of the sphere. 0: all of the child turns away. Sines and cosines are kept times the distance d, so that the three
-// roots wait for nothing but d², and one division is all there is.
+typedef struct bounds {
+    lx_vec3 centre, axis;
+    float radius, radius2, cos_cone, sin_cone, both_sides, power;
+} bounds;
+
+LX_INLINED bounds bounds_in_node(const lx_light_node *n, int k)
+{
+    return (bounds){{n->x[k], n->y[k], n->z[k]}, {n->axis_x[k], n->axis_y[k], n->axis_z[k]}, n->radius[k], n->radius2[k],
+                    n->cos_cone[k], n->sin_cone[k], n->both_sides[k], n->power[k]};
+}
+
+LX_INLINED bounds bounds_in_block(const lx_light_block *n, int k)
+{
+    return (bounds){{n->x[k], n->y[k], n->z[k]}, {n->axis_x[k], n->axis_y[k], n->axis_z[k]}, n->radius[k], n->radius2[k],
+                    n->cos_cone[k], n->sin_cone[k], n->both_sides[k], n->power[k]};
+}
+
+// Largest cosine at the emitters towards the viewer, times the squared distance d2 ([PBR4] 12.6.3): angle from the cone's axis to the viewer, less the cone's, less that of the
+// sphere of `radius`. 0: all of the cluster turns away. Sines and cosines are kept times the distance d, so that the three roots wait for nothing but d².
+LX_INLINED float turned_cosine(bounds b, lx_vec3 to_viewer, float d2, float d, float radius, float radius2)
+{
+    const float signed_along = lx_dot(to_viewer, b.axis), along = signed_along + b.both_sides * (fabsf(signed_along) - signed_along);
+    const float across = sqrtf(lx_max(0, d2 - along * along)), reach = sqrtf(lx_max(0, d2 - radius2));
+    const float c1 = along * b.cos_cone + across * b.sin_cone, s1 = across * b.cos_cone - along * b.sin_cone;
+    const bool in_cone = along >= b.cos_cone * d;
+    const float c = in_cone ? d : c1, s = in_cone ? 0 : s1;
+    const float turned = c * reach + s * lx_min(radius, d);
+    return lx_max(0, c >= reach ? d2 : turned);
+}
+
+// Power × that cosine / d², without the receiver's cosine, so that places alone decide. One division is all there is.
+LX_INLINED float importance_of(bounds b, lx_vec3 viewer)
+{
+    const lx_vec3 to_viewer = lx_sub(viewer, b.centre);
+    const float d2 = lx_max(lx_dot(to_viewer, to_viewer), 1e-18f), d = sqrtf(d2); // whose square is not 0
+    return b.power * turned_cosine(b, to_viewer, d2, d, b.radius, b.radius2) / (d2 * lx_max(d2, b.radius2));
+}
+
 static void find_importances(const lx_light_node *restrict n, lx_vec3 viewer, float importance[restrict width])
 {
-    for (int k = 0; k < width; ++k) {
-        const float x = viewer.x - n->x[k], y = viewer.y - n->y[k], z = viewer.z - n->z[k];
-        const float d2 = lx_max(x * x + y * y + z * z, 1e-18f); // whose square is not 0
-        const float signed_along = x * n->axis_x[k] + y * n->axis_y[k] + z * n->axis_z[k];
-        const float along = signed_along + n->both_sides[k] * (fabsf(signed_along) - signed_along);
-        const float d = sqrtf(d2), across = sqrtf(lx_max(0, d2 - along * along)), reach = sqrtf(lx_max(0, d2 - n->radius2[k]));
-        const float c1 = along * n->cos_cone[k] + across * n->sin_cone[k], s1 = across * n->cos_cone[k] - along * n->sin_cone[k];
-        const bool in_cone = along >= n->cos_cone[k] * d;
-        const float c = in_cone ? d : c1, s = in_cone ? 0 : s1;
-        const float turned = c * reach + s * lx_min(n->radius[k], d), cosine = c >= reach ? d2 : turned;
-        importance[k] = n->power[k] * lx_max(0, cosine) / (d2 * lx_max(d2, n->radius2[k]));
-    }
+    for (int k = 0; k < width; ++k) importance[k] = importance_of(bounds_in_node(n, k), viewer);
 }
 
 // The same for all receivers of a view, as if the sphere were larger by theirs, times the largest cosine at a receiver. `close`: the importances of what
-// is so close that receivers see it differently.
-static void find_view_importances(const lx_light_node *restrict n, const lx_light_view *restrict view, const float keep[restrict width],
-                                  float importance[restrict width], float close[restrict width])
+// is so close that receivers see it differently are added.
+LX_INLINED void find_view_importances(const lx_light_block *restrict n, const lx_light_view *restrict view, float importance[restrict lx_light_block_size],
+                                      float close[restrict lx_light_block_size])
 {
-    const lx_vec3 viewer = view->centre, normal = view->normal;
     const float close_by = close_radii * view->radius;
-    for (int k = 0; k < width; ++k) {
-        const float x = viewer.x - n->x[k], y = viewer.y - n->y[k], z = viewer.z - n->z[k], radius = n->radius[k] + view->radius, radius2 = radius * radius;
-        const float d2 = lx_max(x * x + y * y + z * z, 1e-18f);
-        const float signed_along = x * n->axis_x[k] + y * n->axis_y[k] + z * n->axis_z[k];
-        const float along = signed_along + n->both_sides[k] * (fabsf(signed_along) - signed_along);
-        const float d = sqrtf(d2), across = sqrtf(lx_max(0, d2 - along * along)), reach = sqrtf(lx_max(0, d2 - radius2));
-        const float c1 = along * n->cos_cone[k] + across * n->sin_cone[k], s1 = across * n->cos_cone[k] - along * n->sin_cone[k];
-        const bool in_cone = along >= n->cos_cone[k] * d;
-        const float c = in_cone ? d : c1, s = in_cone ? 0 : s1;
-        const float turned = c * reach + s * lx_min(radius, d), cosine = c >= reach ? d2 : turned;
-        const float height = radius + view->spread * (d + radius) - (x * normal.x + y * normal.y + z * normal.z);
+    for (int k = 0; k < lx_light_block_size; ++k) {
+        const bounds b = bounds_in_block(n, k);
+        const lx_vec3 to_viewer = lx_sub(view->centre, b.centre);
+        const float radius = b.radius + view->radius, radius2 = radius * radius;
+        const float d2 = lx_max(lx_dot(to_viewer, to_viewer), 1e-18f), d = sqrtf(d2);
+        const float height = radius + view->spread * (d + radius) - lx_dot(to_viewer, view->normal);
         const float received = lx_min(d, lx_max(0, height));
-        importance[k] = keep[k] * n->power[k] * received * lx_max(0, cosine) / (d2 * d * lx_max(d2, radius2));
-        close[k] = d < n->radius[k] + close_by ? importance[k] : 0;
+        importance[k] = b.power * received * turned_cosine(b, to_viewer, d2, d, radius, radius2) / (d2 * d * lx_max(d2, radius2));
+        close[k] += d < b.radius + close_by ? importance[k] : 0;
     }
 }
 
-static inline float add_up(const float importance[width], float sums[width])
+LX_INLINED float add_up(const float *importance, int count, float *sums)
 {
     sums[0] = importance[0];
-    for (int k = 1; k < width; ++k) sums[k] = sums[k - 1] + importance[k];
-    return sums[width - 1];
+    for (int k = 1; k < count; ++k) sums[k] = sums[k - 1] + importance[k];
+    return sums[count - 1];
 }
 
-// The child that `place`, a share of all importance, falls into; place becomes its share of that. Counted, not searched: which way it goes is nothing
-// that a processor could guess.
-static inline int choose_child(const float importance[width], const float sums[width], float *place)
+LX_INLINED float below_one(float x)
 {
-    const float at = lx_min(*place * sums[width - 1], sums[width - 1] * 0x1.fffffep-1f); // rounding must not reach the end
+    return lx_max(0, lx_min(x, 0x1.fffffep-1f));
+}
+
+// The cluster that `at` falls into, among running sums; rounding must not reach the end. `place` becomes its share of that. Counted, not searched: which way it goes is
+// nothing that a processor could guess.
+LX_INLINED int choose_cluster(const float *importance, const float *sums, int count, float at, float *place)
+{
     int k = 0;
-    for (int i = 0; i < width - 1; ++i) k += at >= sums[i];
+    for (int i = 0; i < count; ++i) k += at >= sums[i];
+    k = k < count ? k : count - 1;
     while (!(importance[k] > 0)) --k;
-    *place = lx_clamp((at - (sums[k] - importance[k])) / importance[k], 0, 0x1.fffffep-1f);
+    *place = below_one((at - (sums[k] - importance[k])) / importance[k]);
     return k;
 }
 
 // A triangle of a leaf, by power.
-static inline bool choose_in_leaf(const lx_light_tree *tree, const lx_light_node *n, int k, float *u, uint32_t *triangle, float *probability)
+static inline bool choose_in_bin(const lx_light_bin *bin, float *u, uint32_t *triangle, float *probability)
 {
-    const float *share = tree->share + n->first[k];
     uint32_t i = 0;
-    while (i + 1 < n->count[k] && *u >= share[i]) *u -= share[i++];
-    *u = lx_clamp(*u / share[i], 0, 0x1.fffffep-1f);
-    *triangle = tree->order[n->first[k] + i];
-    *probability *= share[i];
+    for (uint32_t k = 0; k < lx_light_leaf_size; ++k) i += *u >= bin->until[k];
+    const float share = share_in(bin, i);
+    *u = below_one((*u - (i > 0 ? bin->until[i - 1] : 0)) / share);
+    *triangle = bin->triangle[i];
+    *probability *= share;
     return *probability > 0;
 }
 
@@ -332,11 +393,11 @@ static inline bool descend(const lx_light_tree *tree, uint32_t number, lx_vec3 v
         const lx_light_node *n = &tree->nodes[number];
         float importance[width], sums[width];
         find_importances(n, viewer, importance);
-        const float total = add_up(importance, sums);
+        const float total = add_up(importance, width, sums);
         if (!(total > 0)) return false;
-        const int k = choose_child(importance, sums, u);
+        const int k = choose_cluster(importance, sums, width, lx_min(*u * total, total * 0x1.fffffep-1f), u);
         *probability *= importance[k] / total;
-        if (n->count[k] > 0) return choose_in_leaf(tree, n, k, u, triangle, probability);
+        if (n->is_leaf[k]) return choose_in_bin(&tree->bins[n->first[k]], u, triangle, probability);
         number = n->first[k];
     }
 }
@@ -354,7 +415,7 @@ float lx_light_tree_probability(const lx_light_tree *tree, uint32_t triangle, lx
     for (uint32_t at = tree->place[triangle]; at != LX_NO_LIGHT_NODE; at = tree->nodes[at / width].parent) {
         float importance[width], sums[width];
         find_importances(&tree->nodes[at / width], viewer, importance);
-        const float total = add_up(importance, sums);
+        const float total = add_up(importance, width, sums);
         if (!(importance[at % width] > 0)) return 0;
         probability *= importance[at % width] / total;
     }
@@ -365,46 +426,74 @@ float lx_light_tree_sum(const lx_light_tree *tree, const lx_light_roots *roots, 
 {
     float sum = 0;
     for (uint32_t i = 0; i < roots->coarse.count; ++i) {
-        const lx_light_branch *part = &tree->parts[roots->coarse.first + i];
-        float importance[width];
-        find_importances(&tree->nodes[part->node], viewer, importance);
-        for (int k = 0; k < width; ++k) sum += part->keep[k] * importance[k];
+        const lx_light_block *block = &tree->blocks[roots->coarse.first + i];
+        float importance[lx_light_block_size];
+        for (int k = 0; k < lx_light_block_size; ++k) importance[k] = importance_of(bounds_in_block(block, k), viewer);
+        for (int k = 0; k < lx_light_block_size; ++k) sum += importance[k];
     }
     return sum;
 }
 
 // ---- tables ----------------------------------------------------------------------------------------------------------------------
 
-bool lx_light_table_fill(lx_light_table *table, const lx_light_tree *tree, const lx_light_roots *roots, const lx_light_view *view)
+LX_INLINED void fill_table(lx_light_table *table, uint32_t count, const lx_light_view *view)
 {
-    table->parts = tree->parts + roots->fine.first;
-    table->count = roots->fine.count;
-    float sum = 0, close_sum = 0;
-    for (uint32_t i = 0; i < table->count; ++i) {
-        float *importance = table->importance[i], close[width];
-        find_view_importances(&tree->nodes[table->parts[i].node], view, table->parts[i].keep, importance, close);
-        sum += (importance[0] + importance[1]) + (importance[2] + importance[3]);
-        close_sum += (close[0] + close[1]) + (close[2] + close[3]);
+    float sum = 0, close_sum = 0, close[lx_light_block_size] = {0};
+    for (uint32_t i = 0; i < count; ++i) {
+        float *v = table->importance[i];
+        find_view_importances(&table->blocks[i], view, v, close);
+        sum += ((v[0] + v[1]) + (v[2] + v[3])) + ((v[4] + v[5]) + (v[6] + v[7]));
         table->sums[i] = sum;
     }
+    for (uint32_t i = count; i < lx_light_fine_blocks; ++i) table->sums[i] = sum;
+    for (int k = 0; k < lx_light_block_size; ++k) close_sum += close[k];
     table->rough = close_sum > most_close * sum;
-    return sum > 0;
 }
 
-bool lx_light_table_sample(const lx_light_table *table, const lx_light_tree *tree, lx_vec3 viewer, float *u, uint32_t *triangle, float *probability)
+#if defined(__x86_64__)
+__attribute__((target("avx2"))) static void fill_table_avx2(lx_light_table *table, uint32_t count, const lx_light_view *view)
 {
-    const uint32_t last = table->count - 1;
-    const float total = table->sums[last], at = lx_min(*u * total, total * 0x1.fffffep-1f);
+    fill_table(table, count, view);
+}
+#endif
+
+bool lx_light_table_fill(lx_light_table *table, const lx_light_tree *tree, const lx_light_roots *roots, const lx_light_view *view)
+{
+    table->blocks = tree->blocks + roots->fine.first;
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx2")) {
+        fill_table_avx2(table, roots->fine.count, view);
+        return table->sums[lx_light_fine_blocks - 1] > 0;
+    }
+#endif
+    fill_table(table, roots->fine.count, view);
+    return table->sums[lx_light_fine_blocks - 1] > 0;
+}
+
+lx_light_choice lx_light_table_choose(const lx_light_table *table, const lx_light_tree *tree, float u)
+{
+    const float total = table->sums[lx_light_fine_blocks - 1], at = lx_min(u * total, total * 0x1.fffffep-1f);
     uint32_t i = 0;
-    for (uint32_t part = 0; part < last; ++part) i += at >= table->sums[part];
-    float sums[width];
+    for (uint32_t block = 0; block < lx_light_fine_blocks; ++block) i += at >= table->sums[block];
+    i = i < lx_light_fine_blocks ? i : lx_light_fine_blocks - 1;
     const float *importance = table->importance[i], before = i > 0 ? table->sums[i - 1] : 0;
-    const float all = add_up(importance, sums);
-    if (!(all > 0)) return false; // not with sums that rise there
-    *u = lx_clamp((at - before) / all, 0, 0x1.fffffep-1f);
-    const int k = choose_child(importance, sums, u);
-    *probability = importance[k] / total;
-    const lx_light_node *n = &tree->nodes[table->parts[i].node];
-    if (n->count[k] > 0) return choose_in_leaf(tree, n, k, u, triangle, probability);
-    return descend(tree, n->first[k], viewer, u, triangle, probability);
+    float sums[lx_light_block_size];
+    lx_light_choice choice = {.probability = 0};
+    const float all = add_up(importance, lx_light_block_size, sums);
+    if (!(all > 0)) return choice; // not with sums that rise there
+    const int k = choose_cluster(importance, sums, lx_light_block_size, lx_min(at - before, all * 0x1.fffffep-1f), &choice.u);
+    choice.probability = importance[k] / total;
+    choice.first = table->blocks[i].first[k];
+    choice.is_leaf = table->blocks[i].is_leaf[k];
+    if (choice.is_leaf) LX_PREFETCH(&tree->bins[choice.first]);
+    return choice;
+}
+
+bool lx_light_tree_finish(const lx_light_tree *tree, const lx_light_choice *choice, lx_vec3 viewer, float *u, uint32_t *triangle, float *probability)
+{
+    *u = choice->u;
+    *probability = choice->probability;
+    if (!(choice->probability > 0)) return false;
+    if (choice->is_leaf) return choose_in_bin(&tree->bins[choice->first], u, triangle, probability);
+    return descend(tree, choice->first, viewer, u, triangle, probability);
 }

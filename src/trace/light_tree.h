@@ -9,6 +9,7 @@
 #include "luxel/base.h"
 #include "math/vec.h"
 
+#include <stdbool.h>
 #include <stdint.h>
 
 enum { lx_light_tree_width = 4, lx_light_leaf_size = 8 };
@@ -21,8 +22,8 @@ typedef struct lx_light_node {
     float cos_cone[lx_light_tree_width], sin_cone[lx_light_tree_width];
     float both_sides[lx_light_tree_width]; ///< 1: the triangles shine from both.
     float power[lx_light_tree_width];
-    uint32_t first[lx_light_tree_width];   ///< Leaf: into order; else a node.
-    uint32_t count[lx_light_tree_width];   ///< Triangles of a leaf; 0: not a leaf.
+    uint32_t first[lx_light_tree_width];   ///< Of a leaf its bin; else a node.
+    bool is_leaf[lx_light_tree_width];
     uint32_t parent;                       ///< 4 * node + child; LX_NO_LIGHT_NODE: the root.
 } lx_light_node;
 
@@ -34,37 +35,46 @@ typedef struct lx_light_leaf {
     uint32_t triangle; ///< The caller's number of it.
 } lx_light_leaf;
 
-/// A part of a tree: those children of a node whose `keep` is 1 (it is 0 for the others).
-typedef struct lx_light_branch {
-    uint32_t node;
-    float keep[lx_light_tree_width];
-} lx_light_branch;
+/// The triangles of a leaf: a cache line.
+typedef struct lx_light_bin {
+    float until[lx_light_leaf_size]; ///< Running sum of their shares of the leaf's power; from the last one on above 1.
+    uint32_t triangle[lx_light_leaf_size];
+} lx_light_bin;
 
-/// Every triangle lies below one of the parts' children.
+enum { lx_light_block_size = 8 };
+
+/// Some clusters of a tree, as in a node, apart from it; those of power 0 are none.
+typedef struct lx_light_block {
+    float x[lx_light_block_size], y[lx_light_block_size], z[lx_light_block_size], radius[lx_light_block_size], radius2[lx_light_block_size];
+    float axis_x[lx_light_block_size], axis_y[lx_light_block_size], axis_z[lx_light_block_size];
+    float cos_cone[lx_light_block_size], sin_cone[lx_light_block_size], both_sides[lx_light_block_size], power[lx_light_block_size];
+    uint32_t first[lx_light_block_size];
+    bool is_leaf[lx_light_block_size];
+} lx_light_block;
+
+/// Every triangle lies below one of the blocks' clusters.
 typedef struct lx_light_cut {
-    uint32_t first, count; ///< Into the tree's parts.
+    uint32_t first, count; ///< Into the tree's blocks.
 } lx_light_cut;
 
 /// What the trees of a source are entered by.
 typedef struct lx_light_roots {
     uint32_t root;             ///< LX_NO_LIGHT_NODE: there is no tree.
-    lx_light_cut coarse, fine; ///< At most lx_light_coarse_parts and lx_light_fine_parts.
+    lx_light_cut coarse, fine; ///< At most lx_light_coarse_blocks and lx_light_fine_blocks.
 } lx_light_roots;
 
-enum { lx_light_coarse_parts = 4, lx_light_fine_parts = 64 };
+enum { lx_light_coarse_blocks = 2, lx_light_fine_blocks = 32 };
 
 typedef struct lx_light_tree {
     lx_light_node *nodes;
     size_t node_count, node_capacity;
-    lx_light_branch *parts;
-    size_t part_count, part_capacity;
-    // By position in the tree's order.
-    uint32_t *order; ///< Triangle there.
-    float *share;    ///< Its share of its leaf's power.
-    size_t order_count, order_capacity[2];
+    lx_light_bin *bins;
+    size_t bin_count, bin_capacity;
+    lx_light_block *blocks;
+    size_t block_count, block_capacity;
     // By triangle; the caller makes room for them.
     uint32_t *place; ///< 4 * node + child of its leaf.
-    float *share_of; ///< As share.
+    float *share_of; ///< Its share of its leaf's power.
 } lx_light_tree;
 
 /// Adds a tree over `leaves` (their order is changed), count > 0, each of power above 0. `place` and `share_of` of their triangles are written.
@@ -89,16 +99,24 @@ typedef struct lx_light_view {
 
 /// Importances of the fine cut for all receivers of a view, their cosine included: most of a descent, done once.
 typedef struct lx_light_table {
-    uint32_t count;
-    float sums[lx_light_fine_parts]; ///< Running.
-    float importance[lx_light_fine_parts][lx_light_tree_width];
-    const lx_light_branch *parts;
+    const lx_light_block *blocks;
+    float sums[lx_light_fine_blocks]; ///< Running; the rest has the last.
+    float importance[lx_light_fine_blocks][lx_light_block_size];
     bool rough; ///< Receivers see the source so differently that each had better ask the tree.
 } lx_light_table;
 
 /// False: certainly nothing shines on any receiver of the view.
 bool lx_light_table_fill(lx_light_table *table, const lx_light_tree *tree, const lx_light_roots *roots, const lx_light_view *view);
-/// As lx_light_tree_sample, for a `viewer` of the view; what the table does not decide is up to the tree.
-bool lx_light_table_sample(const lx_light_table *table, const lx_light_tree *tree, lx_vec3 viewer, float *u, uint32_t *triangle, float *probability);
+
+/// A choice halfway: a cluster of the table, and the place within it.
+typedef struct lx_light_choice {
+    float probability, u;
+    uint32_t first;
+    bool is_leaf;
+} lx_light_choice;
+
+/// As lx_light_tree_sample, for a viewer of the table's view, in two steps: memory that the second waits for is asked for by the first.
+lx_light_choice lx_light_table_choose(const lx_light_table *table, const lx_light_tree *tree, float u);
+bool lx_light_tree_finish(const lx_light_tree *tree, const lx_light_choice *choice, lx_vec3 viewer, float *u, uint32_t *triangle, float *probability);
 
 #endif

@@ -9,8 +9,21 @@
 
 #include "math/vec.h"
 
+/// Sine and cosine of 2 pi t, t in [0, 1): Taylor series about the nearest quarter turn, within a few roundings; no branches and no calls, so that loops stay tight.
+LX_INLINED void lx_sincos_of_turn(float t, float *sine, float *cosine)
+{
+    const int quarter = (int)(4 * t + 0.5f);
+    const float x = (t - 0.25f * (float)quarter) * (2 * LX_PI), x2 = x * x;
+    const float s = x * (1 - x2 * (1.0f / 6 - x2 * (1.0f / 120 - x2 * (1.0f / 5040 - x2 * (1.0f / 362880)))));
+    const float c = 1 - x2 * (0.5f - x2 * (1.0f / 24 - x2 * (1.0f / 720 - x2 * (1.0f / 40320))));
+    const bool odd = quarter & 1;
+    const float a = odd ? c : s, b = odd ? s : c;
+    *sine = quarter & 2 ? -a : a;
+    *cosine = (quarter + 1) & 2 ? -b : b;
+}
+
 /// Uniform on the unit disk (concentric map, [PBR4] A.5.1). pdf_area = 1 / pi.
-static inline lx_vec2 lx_sample_disk(lx_vec2 u)
+LX_INLINED lx_vec2 lx_sample_disk(lx_vec2 u)
 {
     const float x = 2 * u.x - 1, y = 2 * u.y - 1;
     if (x == 0 && y == 0) return (lx_vec2){0, 0};
@@ -34,16 +47,17 @@ static inline lx_vec3 lx_sample_cosine_hemisphere(lx_vec2 u)
 
 /// Uniform direction within a cone around +Z, given 1 - cos(half angle), which keeps its precision for narrow cones.
 /// pdf_solid_angle = 1 / (2 pi one_minus_cos).
-static inline lx_vec3 lx_sample_cone(lx_vec2 u, float one_minus_cos)
+LX_INLINED lx_vec3 lx_sample_cone(lx_vec2 u, float one_minus_cos)
 {
     const float height = u.x * one_minus_cos; // 1 - cos(theta)
     const float sine = sqrtf(lx_max(0.0f, height * (2 - height)));
-    const float phi = 2 * LX_PI * u.y;
-    return (lx_vec3){sine * cosf(phi), sine * sinf(phi), 1 - height};
+    float sin_phi, cos_phi;
+    lx_sincos_of_turn(u.y, &sin_phi, &cos_phi);
+    return (lx_vec3){sine * cos_phi, sine * sin_phi, 1 - height};
 }
 
 /// From the frame whose +Z is `n` to the world.
-static inline lx_vec3 lx_to_world(lx_vec3 n, lx_vec3 local)
+LX_INLINED lx_vec3 lx_to_world(lx_vec3 n, lx_vec3 local)
 {
     lx_vec3 t, b;
     lx_tangent_frame(n, &t, &b);
@@ -51,7 +65,7 @@ static inline lx_vec3 lx_to_world(lx_vec3 n, lx_vec3 local)
 }
 
 /// Barycentrics (of the second and third corner), uniform over a triangle's area ([PBR4] A.5.2, square-root form).
-static inline lx_vec2 lx_sample_triangle(lx_vec2 u)
+LX_INLINED lx_vec2 lx_sample_triangle(lx_vec2 u)
 {
     const float root = sqrtf(u.x);
     return (lx_vec2){root * (1 - u.y), root * u.y};

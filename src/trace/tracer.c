@@ -2,6 +2,7 @@
 #include "trace/tracer.h"
 
 #include "base/error.h"
+#include "base/memory.h"
 #include "math/hash.h"
 #include "trace/tracer_data.h"
 
@@ -110,6 +111,7 @@ static lx_rgb transmittance_at(void *user, uint32_t surface, uint32_t triangle, 
     const lx_tracer *tracer = user;
     if (tracer->surfaces[surface].kind == LX_SURFACE_OPAQUE) return (lx_rgb){0, 0, 0};
     if (tracer->surfaces[surface].kind == LX_SURFACE_CUTOUT) return lx_rgb_grey(is_hole(user, surface, triangle, u, v) ? 1 : 0);
+    if (tracer->surfaces[surface].even) return tracer->surfaces[surface].transmittance;
     const lx_material *m = material_of(tracer, surface);
     const surface_point p = point_of(tracer, surface, triangle, u, v);
     float opacity;
@@ -267,12 +269,12 @@ static lx_source_sphere sphere_of_emissive(const lx_tracer *tracer, uint32_t sou
     lx_bounds bounds = lx_bounds_empty();
     lx_vec3 p[3];
     for (uint32_t i = e->first_triangle[source]; i < e->first_triangle[source + 1]; ++i) {
-        lx_triangle_corners(tracer, e->triangles[i].surface, e->triangles[i].triangle, p);
+        lx_triangle_corners(tracer, e->places[i].surface, e->places[i].triangle, p);
         for (int k = 0; k < 3; ++k) lx_bounds_add(&bounds, p[k]);
     }
     lx_source_sphere s = {.centre = lx_scale(lx_add(bounds.low, bounds.high), 0.5f), .power = e->source_power[source]};
     for (uint32_t i = e->first_triangle[source]; i < e->first_triangle[source + 1]; ++i) {
-        lx_triangle_corners(tracer, e->triangles[i].surface, e->triangles[i].triangle, p);
+        lx_triangle_corners(tracer, e->places[i].surface, e->places[i].triangle, p);
         for (int k = 0; k < 3; ++k) s.radius = lx_max(s.radius, lx_distance(s.centre, p[k]));
     }
     s.radius *= 1.0001f;
@@ -437,27 +439,6 @@ bool lx_trace_crowded(const lx_tracer *tracer, const lx_patch *patches, size_t c
     return lx_accel_crowded(tracer->accel, patches, count);
 }
 
-static float offset_component(float position, float normal)
-{
-    static const float origin = 1.0f / 32, float_scale = 1.0f / 65536, int_scale = 256;
-    if (fabsf(position) < origin) return position + float_scale * normal;
-    int32_t bits;
-    memcpy(&bits, &position, sizeof bits);
-    const int32_t steps = (int32_t)(int_scale * normal);
-    bits += position < 0 ? -steps : steps;
-    memcpy(&position, &bits, sizeof position);
-    return position;
-}
-
-// Coordinates of different size get steps of different size, so the sum of all three would also drift along the surface, and near an edge
-// through the next wall. Only its share along the normal is taken.
-lx_vec3 lx_offset_origin(lx_vec3 position, lx_vec3 normal)
-{
-    const lx_vec3 moved = {offset_component(position.x, normal.x), offset_component(position.y, normal.y),
-                           offset_component(position.z, normal.z)};
-    return lx_mad(position, normal, lx_dot(lx_sub(moved, position), normal));
-}
-
 void lx_ray_step_past(lx_ray *ray, const lx_hit *hit)
 {
     const float next = hit->t * (1 + 0x1p-20f);
@@ -588,16 +569,10 @@ static void shade(const lx_tracer *tracer, const lx_hit *hit, lx_shading *s)
     s->emission = s->lit || surface->material->unlit ? surface->emission : (lx_rgb){0, 0, 0};
 }
 
-#if defined(__GNUC__)
-#define PREFETCH(address) __builtin_prefetch(address)
-#else
-#define PREFETCH(address) ((void)(address))
-#endif
-
 // Hits lie anywhere in memory: corners' numbers are asked for some hits ahead, then the corners by their numbers.
 static void prefetch_indices(const lx_tracer *tracer, const lx_hit *hit)
 {
-    if (hit->surface != LX_MISS) PREFETCH(tracer->surfaces[hit->surface].indices + 3 * (size_t)hit->triangle);
+    if (hit->surface != LX_MISS) LX_PREFETCH(tracer->surfaces[hit->surface].indices + 3 * (size_t)hit->triangle);
 }
 
 static void prefetch_corners(const lx_tracer *tracer, const lx_hit *hit)
@@ -606,8 +581,8 @@ static void prefetch_corners(const lx_tracer *tracer, const lx_hit *hit)
     const lx_traced_surface *surface = &tracer->surfaces[hit->surface];
     const uint32_t *indices = surface->indices + 3 * (size_t)hit->triangle;
     for (int k = 0; k < 3; ++k) {
-        PREFETCH(surface->positions + indices[k]);
-        if (surface->normals) PREFETCH(surface->normals + indices[k]);
+        LX_PREFETCH(surface->positions + indices[k]);
+        if (surface->normals) LX_PREFETCH(surface->normals + indices[k]);
     }
 }
 

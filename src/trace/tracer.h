@@ -7,6 +7,8 @@
 #include "luxel/bake.h"
 #include "scene/scene.h"
 
+#include <string.h>
+
 #define LX_MISS UINT32_MAX
 
 /// Points origin + t · direction with t in (t_min, t_max). `direction` needs no unit length; t counts in its lengths.
@@ -105,9 +107,29 @@ bool lx_surface_is_plain(const lx_tracer *tracer, uint32_t surface);
 /// Has the surface an inside behind it? Opaque ones with one side have; panes, cutouts and sheets with two sides don't.
 bool lx_surface_is_solid(const lx_tracer *tracer, uint32_t surface);
 
-/// A ray's origin moved off its surface to the side of `normal` (unit, geometric) by a few roundings of the coordinates.
+LX_INLINED float lx_offset_component(float position, float normal)
+{
+    const float origin = 1.0f / 32, float_scale = 1.0f / 65536, int_scale = 256;
+    int32_t bits;
+    memcpy(&bits, &position, sizeof bits);
+    const int32_t steps = (int32_t)(int_scale * normal);
+    bits += position < 0 ? -steps : steps;
+    float moved;
+    memcpy(&moved, &bits, sizeof moved);
+    return fabsf(position) < origin ? position + float_scale * normal : moved;
+}
+
+/// A ray's origin moved off its surface to the side of `normal` (unit, geometric) by a few roundings of the coordinates. No branches: loops over it become
+/// vectors.
 /// Based on: [WachterBinder2019] "A Fast and Robust Method for Avoiding Self-Intersection", Ray Tracing Gems, ch. 6.
-lx_vec3 lx_offset_origin(lx_vec3 position, lx_vec3 normal);
+LX_INLINED lx_vec3 lx_offset_origin(lx_vec3 position, lx_vec3 normal)
+{
+    // Coordinates of different size get steps of different size, so the sum of all three would also drift along the surface, and near an edge
+    // through the next wall. Only its share along the normal is taken.
+    const lx_vec3 moved = {lx_offset_component(position.x, normal.x), lx_offset_component(position.y, normal.y),
+                           lx_offset_component(position.z, normal.z)};
+    return lx_mad(position, normal, lx_dot(lx_sub(moved, position), normal));
+}
 
 /// Lets the ray go on behind a hit: t_min moves past hit.t by a few roundings. The same triangle may still be hit once more;
 /// callers that count crossings skip it.

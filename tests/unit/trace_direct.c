@@ -1,7 +1,9 @@
 // Direct light of a tile against brute force: every kind of source, half of the tile under a shade.
 #include "trace/direct.h"
+#include "trace/light_sample.h"
+#include "trace/source_view.h"
 #include "trace/tracer_data.h"
-#include "math/hash.h"
+#include "math/sobol.h"
 #include "unit/scene_fixture.h"
 
 enum { edge = 10, luxels = edge * edge, samples = 64, brute_samples = 16 * 200, most_cells = 6 };
@@ -230,6 +232,47 @@ static void samples_by_power_bring_the_same_light(void **state)
     end(&f);
 }
 
+// Sixteen at a time or one by one, samples are the same; from below, behind and beside as well.
+static void views_give_the_samples_of_the_source(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"bulb", "globe", "sun", "panel", "dish", "glow", "screen"};
+    fixture f;
+    begin(&f, 1);
+    for (size_t n = 0; n < sizeof names / sizeof *names; ++n) {
+        const uint32_t source = source_number(&f, names[n]);
+        uint32_t arrived = 0;
+        for (uint32_t i = 0; i < 200; ++i) {
+            lx_receiver receivers[lx_view_size];
+            for (uint32_t k = 0; k < lx_view_size; ++k) {
+                const uint32_t bits = lx_hash_combine(i, k);
+                const float x = lx_unit_float(bits), y = lx_unit_float(lx_hash32(bits)), tilt = lx_unit_float(lx_hash32(i)) * 8;
+                const lx_vec3 up = {sinf(tilt), cosf(tilt), 0};
+                receivers[k] = (lx_receiver){.position = {4 * x - 2, i % 3 == 0 ? 2.3f : 0, 4 * y - 2}, .normal = lx_normalize((lx_vec3){up.x, up.y, x / 4}),
+                                             .geometric_normal = up};
+            }
+            static lx_source_view view;
+            lx_view_samples samples_of_view;
+            lx_source_view_fill(&view, f.tracer, source, receivers);
+            if (view.reaches) lx_source_view_sample(&view, i, 16 * (i % 4), i % 2, &samples_of_view);
+            for (uint32_t k = 0; k < lx_view_size; ++k) {
+                lx_ray ray;
+                lx_rgb light;
+                uint32_t cell;
+                if (!lx_sample_source(f.tracer, source, &receivers[k], lx_sobol_pair(16 * (i % 4) + k, i), i % 2, &ray, &light, &cell)) light = (lx_rgb){0, 0, 0};
+                assert_near(view.reaches ? (double)samples_of_view.light[k].g : 0, (double)light.g, 1e-5 * (double)light.g + 1e-6);
+                if (lx_rgb_is_black(light)) continue;
+                ++arrived;
+                const lx_vec3 direction = {samples_of_view.direction.x[k], samples_of_view.direction.y[k], samples_of_view.direction.z[k]};
+                assert_true(lx_distance(direction, ray.direction) < 1e-5f);
+                assert_true(view.origin.x[k] == ray.origin.x && view.t_max == ray.t_max && samples_of_view.cell[k] == cell);
+            }
+        }
+        assert_true(arrived > 100);
+    }
+    end(&f);
+}
+
 // At later vertices of a path the ray that goes on has it all.
 static void paths_take_no_samples_of_a_uniform_sky(void **state)
 {
@@ -366,6 +409,7 @@ int main(void)
         cmocka_unit_test(cells_of_monitors_give_what_brute_force_does),
         cmocka_unit_test(uniform_skies_give_what_brute_force_does),
         cmocka_unit_test(samples_by_power_bring_the_same_light),
+        cmocka_unit_test(views_give_the_samples_of_the_source),
         cmocka_unit_test(samples_and_rays_share_all_light_of_a_uniform_sky),
         cmocka_unit_test(paths_take_no_samples_of_a_uniform_sky),
         cmocka_unit_test(a_sliver_of_sky_is_not_lost),

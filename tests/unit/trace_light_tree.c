@@ -175,7 +175,8 @@ static void table_of_a_view_gives_each_receiver_its_light(void **state)
         for (uint32_t i = 0; i < draws; ++i) {
             float u = ((float)i + 0.5f) / draws, p;
             uint32_t n;
-            if (!lx_light_table_sample(&table, &t.tree, viewer, &u, &n, &p)) continue;
+            const lx_light_choice choice = lx_light_table_choose(&table, &t.tree, u);
+            if (!lx_light_tree_finish(&t.tree, &choice, viewer, &u, &n, &p)) continue;
             assert_true(u >= 0 && u < 1 && p > 0 && p <= 1);
             got += light_of(&t.leaves[n], viewer) / (double)p / draws;
         }

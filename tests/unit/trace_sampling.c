@@ -1,5 +1,6 @@
 // Directions and points against their densities: chi-square tests with fixed seeds and stated significance, closed forms.
 #include "math/sobol.h"
+#include "trace/lamp_sample.h"
 #include "trace/light_sample.h"
 #include "trace/sampling.h"
 
@@ -167,7 +168,8 @@ static void range_and_spot_factors_follow_the_khronos_formulas(void **state)
     assert_true(lx_range_factor(10, 10) == 0);
     assert_true(lx_range_factor(20, 10) == 0);
     assert_true(fabsf(lx_range_factor(5, 10) - (1 - 0.0625f)) < 1e-6f);
-    const lx_light spot = {.kind = LX_LIGHT_SPOT, .inner_angle = 0.3f, .outer_angle = 0.6f};
+    const lx_light light = {.kind = LX_LIGHT_SPOT, .inner_angle = 0.3f, .outer_angle = 0.6f};
+    const lx_lamp spot = lx_lamp_of(&light);
     assert_true(lx_spot_factor(&spot, cosf(0.2f)) == 1);
     assert_true(lx_spot_factor(&spot, cosf(0.7f)) == 0);
     const float c = cosf(0.45f), a = (c - cosf(0.6f)) / (cosf(0.3f) - cosf(0.6f));
