@@ -9,6 +9,8 @@
 
 #include "math/vec.h"
 
+#include <stdbool.h>
+
 /// Uniform on the unit disk (concentric map, [PBR4] A.5.1). pdf_area = 1 / pi.
 static inline lx_vec2 lx_sample_disk(lx_vec2 u)
 {
@@ -30,6 +32,28 @@ static inline lx_vec3 lx_sample_cosine_hemisphere(lx_vec2 u)
 {
     const lx_vec2 d = lx_sample_disk(u);
     return (lx_vec3){d.x, d.y, sqrtf(lx_max(0.0f, 1 - d.x * d.x - d.y * d.y))};
+}
+
+/// Sine and cosine of 2 pi t, t in [0, 1): Taylor series about the nearest quarter turn, within a few roundings; no branches and no calls, so that loops stay tight.
+static inline void lx_sincos_of_turn(float t, float *sine, float *cosine)
+{
+    const int quarter = (int)(4 * t + 0.5f);
+    const float x = (t - 0.25f * (float)quarter) * (2 * LX_PI), x2 = x * x;
+    const float s = x * (1 - x2 * (1.0f / 6 - x2 * (1.0f / 120 - x2 * (1.0f / 5040 - x2 * (1.0f / 362880)))));
+    const float c = 1 - x2 * (0.5f - x2 * (1.0f / 24 - x2 * (1.0f / 720 - x2 * (1.0f / 40320))));
+    const bool odd = quarter & 1;
+    const float a = odd ? c : s, b = odd ? s : c;
+    *sine = quarter & 2 ? -a : a;
+    *cosine = (quarter + 1) & 2 ? -b : b;
+}
+
+/// The same as lx_sample_cosine_hemisphere by a disk in polar coordinates: rings and sectors of the unit square are rings and sectors of directions.
+static inline lx_vec3 lx_sample_polar_hemisphere(lx_vec2 u)
+{
+    float sine, cosine;
+    lx_sincos_of_turn(u.y, &sine, &cosine);
+    const float radius = sqrtf(u.x);
+    return (lx_vec3){radius * cosine, radius * sine, sqrtf(1 - u.x)};
 }
 
 /// Uniform direction within a cone around +Z, given 1 - cos(half angle), which keeps its precision for narrow cones.
