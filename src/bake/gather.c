@@ -87,7 +87,7 @@ static void release_cache(lx_gather_job *g, uint32_t workers)
     }
     for (uint32_t t = 0; g->extras && t < g->job->map.tile_count; ++t) lx_free(g->extras[t].items);
     void **arrays[] = {(void **)&g->scratch, (void **)&g->extras, (void **)&g->luxels, (void **)&g->rows[0], (void **)&g->rows[1],
-                       (void **)&g->rows[2], (void **)&g->rows_direct, (void **)&g->hits, (void **)&g->met_estimates, (void **)&g->closeness, (void **)&g->sky_weight};
+                       (void **)&g->rows[2], (void **)&g->rows_direct, (void **)&g->hits, (void **)&g->met_estimates, (void **)&g->closeness, (void **)&g->sky_cells};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) {
         lx_free(*arrays[i]);
         *arrays[i] = NULL;
@@ -137,7 +137,7 @@ static lx_result allocate(lx_gather_job *g, lx_error *error)
     g->luxels = lx_calloc_array(cached, sizeof *g->luxels);
     g->closeness = lx_calloc_array(luxels, sizeof *g->closeness);
     g->spacing = lx_calloc_array(luxels, sizeof *g->spacing);
-    g->sky_weight = lx_calloc_array(luxels, sizeof *g->sky_weight);
+    g->sky_cells = lx_calloc_array(g->samples_sky ? luxels : 0, sizeof *g->sky_cells);
     for (int i = 0; i < 3; ++i) g->rows[i] = lx_malloc_array(i < 2 || lx_gather_is_truncated(g) ? cached : 0, g->row_stride * sizeof *g->rows[i]);
     g->rows_direct = lx_malloc_array(cached, g->row_stride * sizeof *g->rows_direct);
     g->hits = lx_malloc_array(cached, g->pass_rays * sizeof *g->hits);
@@ -155,7 +155,7 @@ static lx_result allocate(lx_gather_job *g, lx_error *error)
     g->layer_means = lx_calloc_array(layers, sizeof *g->layer_means);
     g->halvings = lx_calloc_array(tiles, layers * sizeof *g->halvings);
     g->gain = lx_malloc_array(layers, sizeof *g->gain);
-    if (!g->scales || !g->authored || !g->luxels || !g->closeness || !g->spacing || !g->sky_weight || !g->rows[0] || !g->rows[1] || !g->rows[2] || !g->rows_direct || !g->hits || !g->extras || !g->direct || !g->indirect ||
+    if (!g->scales || !g->authored || !g->luxels || !g->closeness || !g->spacing || !g->sky_cells || !g->rows[0] || !g->rows[1] || !g->rows[2] || !g->rows_direct || !g->hits || !g->extras || !g->direct || !g->indirect ||
         !g->pass_change || !g->pass_energy || !g->converged || !g->tiles || !g->layer_means || !g->halvings || !g->gain)
         return lx_fail_memory(error, "layers; --memory bakes them in groups");
     for (size_t l = 0; l < layers; ++l) g->gain[l] = 1;

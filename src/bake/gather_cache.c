@@ -14,8 +14,6 @@ enum { most_passes = 1000 };
 static const float pass_near_texels = 1.0f;
 static const float near_source_texels = 4; // light of what is nearer differs too much over a luxel
 static const double enough_energy = 1e-3; // of a layer's: what later bounces may still have added
-// Variances of one look at the sky, as a share of it, from which on it is sampled besides, and four times as often.
-static const float some_sky_variance = 0.02f, much_sky_variance = 0.1f;
 static const uint32_t cache_stream = 0x63616368;
 
 // Mean albedo of a luxel: what its row is multiplied by. Hits that are looked up lie farther than a texel, where no finer detail can be told.
@@ -72,11 +70,13 @@ static bool is_near(const lx_gather_job *g, uint32_t luxel, uint32_t source)
     return g->settings.bounces > 0 && g->luxels[luxel].near_sources && lx_gather_is_near(g->bake->tracer, &g->luxels[luxel], source);
 }
 
-// Adds a source's direct light to its layers: to the estimates if it counts there, to the cache's rows always.
+// Adds a source's direct light to its layers: to the estimates if it counts there, and to the cache's rows. Those have all of a uniform sky from the cache's rays already: samples
+// of it lie where these rays saw it, so what they bring must not be mixed with what these rays bring.
 static void add_source(const lx_gather_job *g, lx_gather_scratch *s, uint32_t source, bool counts)
 {
     const lx_source_use *use = &g->uses[source];
     const uint32_t cells = lx_tracer_cell_count(g->bake->tracer, source);
+    const bool is_shared_sky = g->samples_sky && source == g->bake->source_count - 1; // the sky comes last
     for (uint32_t cell = 0; cell < cells; ++cell) {
         const uint32_t layer = (uint32_t)use->layer + (use->cells ? 0 : cell);
         const lx_rgb weight = use->cells ? lx_rgb_mul(use->weight, use->cells[cell]) : use->weight;
@@ -84,14 +84,16 @@ static void add_source(const lx_gather_job *g, lx_gather_scratch *s, uint32_t so
         lx_estimate *estimates = g->direct + (size_t)layer * g->luxel_count;
         for (uint32_t i = 0; i < s->count; ++i) {
             const lx_rgb e = lx_rgb_mul(s->mean[(size_t)cell * s->count + i], weight);
+            if (counts) {
+                lx_estimate *estimate = &estimates[s->luxel[i]];
+                estimate->mean = lx_rgb_add(estimate->mean, e);
+                estimate->variance += s->variance[(size_t)cell * s->count + i] * grey_weight * grey_weight;
+            }
+            if (is_shared_sky && !s->alone[i]) continue;
             float *row = (is_near(g, s->luxel[i], source) ? s->near_light : s->sums) + g->stride * i + layer;
             row[0] += e.r * unit;
             row[g->row_layers] += e.g * unit;
             row[2 * g->row_layers] += e.b * unit;
-            if (!counts) continue;
-            lx_estimate *estimate = &estimates[s->luxel[i]];
-            estimate->mean = lx_rgb_add(estimate->mean, e);
-            estimate->variance += s->variance[(size_t)cell * s->count + i] * grey_weight * grey_weight;
         }
     }
 }
@@ -118,7 +120,7 @@ static float find_closeness(const float *distances, uint32_t count)
 static lx_result send_pass_rays(const lx_gather_job *g, lx_gather_scratch *s, size_t task, lx_error *error)
 {
     const lx_gather_settings settings = {.tracer = g->bake->tracer, .lookup = &g->lookup, .uses = g->uses, .scales = g->scales,
-                                         .row_layers = g->row_layers, .bounces = g->settings.bounces, .everything = true, .near_texels = pass_near_texels, .luxels = g->luxels};
+                                         .row_layers = g->row_layers, .bounces = g->settings.bounces, .everything = true, .near_texels = pass_near_texels, .luxels = g->luxels, .sky_cell_count = g->pass_rays};
     lx_gather_extras *extras = &g->extras[task];
     for (uint32_t first = 0; first < s->count; first += lx_gather_chunk_luxels) {
         const uint32_t end = first + lx_gather_chunk_luxels < s->count ? first + lx_gather_chunk_luxels : s->count;
@@ -128,7 +130,7 @@ static lx_result send_pass_rays(const lx_gather_job *g, lx_gather_scratch *s, si
                 s->starts[count++] = (lx_gather_start){.receiver = &s->sites[i * lx_site_count + k % lx_site_count],
                                                        .stream = s->stream[i] ^ cache_stream, .sample = k, .target = i};
         const lx_gather_output out = {.sums = s->sums, .met = s->met, .near_met = settings.bounces > 0 ? s->near_light : NULL, .targets = s->luxel,
-                                      .sky_light = s->sky_light, .distances = s->distances, .luxels = s->found, .extras = extras};
+                                      .sky_seen = g->samples_sky ? s->sky_seen : NULL, .sky_through = s->sky_through, .distances = s->distances, .luxels = s->found, .extras = extras};
         const lx_result result = lx_gather_trace(s->batch, &settings, s->starts, count, &out, error);
         if (result != LX_OK) return result;
         for (uint32_t i = first; i < end; ++i) {
@@ -156,53 +158,12 @@ static void choose_senders(const lx_gather_job *g, lx_gather_scratch *s, const l
     for (uint32_t i = 0; i < s->count; ++i) s->alone[i] = g->spacing[s->luxel[i]] > 0;
 }
 
-// How often a luxel samples a uniform sky beside its gather rays, which look for it too: by the variance of one look, as the cache's rays in the luxel and around it tell; where
-// they saw all of it or nothing, not at all. (The rays that decide are others than those that count, so nothing is lost on average.)
-static void weigh_sky(const lx_gather_job *g, lx_gather_scratch *s)
-{
-    enum { edge = lx_luxel_tile_edge };
-    float seen[edge + 2][edge + 2], lists[edge + 2][edge + 2];
-    memset(seen, 0, sizeof seen);
-    memset(lists, 0, sizeof lists);
-    for (uint32_t i = 0; i < s->count; ++i) {
-        const uint32_t x = s->place[i] % edge + 1, y = s->place[i] / edge + 1;
-        seen[y][x] = lx_rgb_max(s->sky_light[i]) / (LX_PI * (float)g->pass_rays);
-        lists[y][x] = 1;
-    }
-    for (uint32_t i = 0; i < s->count; ++i) {
-        float sum = 0, count = 0;
-        for (uint32_t k = 0; k < 9; ++k) {
-            const uint32_t x = s->place[i] % edge + k % 3, y = s->place[i] / edge + k / 3;
-            sum += seen[y][x];
-            count += lists[y][x];
-        }
-        const float share = sum / count, variance = share * (1 - share);
-        uint8_t weight = variance > much_sky_variance ? 4 : variance > some_sky_variance;
-        if (s->alone[i] && weight == 0) weight = 1;
-        s->sky_weight[i] = g->sky_weight[s->luxel[i]] = weight;
-    }
-}
-
-// The cache's rays met a uniform sky as if nobody else looked for it: what samples share with them is taken from their part again.
-static void share_sky(const lx_gather_job *g, lx_gather_scratch *s, const lx_source_use *use)
-{
-    const float unit = g->scales[use->layer] / (float)g->pass_rays;
-    for (uint32_t i = 0; i < s->count; ++i) {
-        if (s->alone[i]) continue; // their part is gone already
-        const lx_rgb taken = lx_rgb_scale(lx_rgb_mul(s->sky_light[i], use->weight), (1 - lx_uniform_sky_weight(s->sky_weight[i])) * unit);
-        float *row = s->sums + g->stride * i + use->layer;
-        row[0] -= taken.r;
-        row[g->row_layers] -= taken.g;
-        row[2 * g->row_layers] -= taken.b;
-    }
-}
-
 static void light_from_sources(const lx_gather_job *g, lx_gather_scratch *s)
 {
     const lx_bake_desc *desc = &g->bake->desc;
     lx_direct_bounds bounds;
     lx_direct_tile direct = {.count = s->count, .place = s->place, .chart = s->chart, .stream = s->stream, .sites = s->sites, .alone = s->alone,
-                             .sky_weight = s->sky_weight};
+                             .sky_cells = s->sky_cells, .sky_cell_count = g->pass_rays};
     lx_direct_find_bounds(&direct, &bounds);
     direct.bounds = &bounds;
     const lx_direct_settings settings = {.tracer = g->bake->tracer, .samples = (desc->samples + lx_direct_sites - 1) / lx_direct_sites * lx_direct_sites,
@@ -213,7 +174,6 @@ static void light_from_sources(const lx_gather_job *g, lx_gather_scratch *s)
         if (use->layer < 0 || (!counts && g->settings.bounces == 0)) continue;
         if (lx_pool_is_stopping(g->bake->scene->context->pool)) return;
         if (lx_direct_light(s->direct, &settings, &direct, source, s->mean, s->variance)) add_source(g, s, source, counts);
-        if (g->samples_sky && source == g->bake->source_count - 1 && g->settings.bounces > 0) share_sky(g, s, use); // the sky comes last
     }
 }
 
@@ -240,7 +200,8 @@ static lx_result light_tile(void *user, size_t task, uint32_t worker, lx_error *
     const size_t row_values = g->stride * s->count;
     memset(s->sums, 0, row_values * sizeof *s->sums);
     memset(s->alone, 0, s->count);
-    memset(s->sky_light, 0, s->count * sizeof *s->sky_light);
+    memset(s->sky_seen, 0, s->count * sizeof *s->sky_seen);
+    memset(s->sky_through, 0, s->count * sizeof *s->sky_through);
     const bool bounces = g->settings.bounces > 0;
     for (uint32_t i = 0; bounces && i < s->count; ++i) g->luxels[s->luxel[i]] = describe(g, &s->texel, s->luxel[i], &s->sites[(size_t)i * lx_site_count]);
     if (bounces) describe_invalid(g, &s->texel, tile);
@@ -250,7 +211,7 @@ static lx_result light_tile(void *user, size_t task, uint32_t worker, lx_error *
         const lx_result result = send_pass_rays(g, s, task, error);
         if (result != LX_OK) return result;
         choose_senders(g, s, tile);
-        if (g->samples_sky) weigh_sky(g, s);
+        if (g->samples_sky) lx_gather_choose_sky_cells(g, s);
     }
     if (bounces) {
         const float ray_unit = LX_ROW_UNIT / (float)g->pass_rays;

@@ -35,8 +35,8 @@ typedef struct lx_gather_scratch {
     uint32_t luxel[lx_gather_tile_luxels]; // of the map
     bool *is_beside;             // [layer_count] of lamps beside the luxel at work
     uint8_t alone[lx_gather_tile_luxels];  // it sends no gather rays
-    lx_rgb sky_light[lx_gather_tile_luxels]; // what the cache's rays met of the sky
-    uint8_t sky_weight[lx_gather_tile_luxels]; // of luxels of the tile, later of targets
+    uint64_t sky_seen[lx_gather_tile_luxels], sky_through[lx_gather_tile_luxels]; // cells in which the cache's rays met a uniform sky, and through a pane
+    lx_sky_cells sky_cells[lx_gather_tile_luxels]; // of luxels of the tile, later of targets
     uint32_t count;              // luxels of the tile that are at work
 } lx_gather_scratch;
 
@@ -70,7 +70,7 @@ typedef struct lx_gather_job {
     float *authored;        // [layer_count] mean channel of c
     lx_gather_luxel *luxels; // [luxel]
     float *closeness;       // [luxel] of what is around, 1 / m²; INFINITY: not to be interpolated
-    uint8_t *sky_weight;    // [luxel] of samples of a uniform sky against gather rays; 0: those alone look for it
+    lx_sky_cells *sky_cells; // [luxel] where samples look for a uniform sky besides gather rays; as many cells as the cache has rays a luxel
     uint8_t *spacing;       // [luxel] of the knots it is interpolated from; 0: it sends gather rays
     bool interpolates;
     bool samples_sky;       // it is of one colour
@@ -117,6 +117,9 @@ bool lx_report_part(void *user, const lx_progress *progress);
 void lx_gather_list_luxels(const lx_gather_job *g, const lx_luxel_tile *tile, bool senders, lx_gather_scratch *s);
 /// Some of the sites of a listed luxel.
 void lx_gather_place_sites(const lx_gather_job *g, lx_gather_scratch *s, uint32_t index, uint32_t first, uint32_t count, lx_receiver *out);
+
+/// Chooses where the listed luxels sample a uniform sky, by what the cache's rays met in them and around them: gather_sky.c.
+void lx_gather_choose_sky_cells(const lx_gather_job *g, lx_gather_scratch *s);
 
 /// Direct light and the irradiance cache's rays; then its passes, one a bounce beyond the first: gather_cache.c.
 lx_result lx_gather_light(lx_gather_job *g, lx_error *error);

@@ -146,18 +146,25 @@ static bool brings(const lx_gather_settings *settings, const flight *f, uint32_t
     return (luxel->near_sources >> source % 64 & 1) && lx_gather_is_near(settings->tracer, luxel, source);
 }
 
-static void add_sky(const lx_gather_settings *settings, const lx_gather_output *out, lx_rgb throughput, float cosine, uint32_t target,
-                    lx_vec3 direction, uint32_t vertex)
+static lx_vec2 direction_point(uint32_t stream, uint32_t sample, uint32_t vertex)
+{
+    return lx_sobol_pair(sample, dimension_key(stream, vertex, dimension_bounce));
+}
+
+static void add_sky(const lx_gather_settings *settings, const lx_gather_output *out, const flight *f, lx_vec3 direction)
 {
     const lx_tracer *tracer = settings->tracer;
     if (!tracer->sky.present) return;
     const lx_source_use *use = &settings->uses[tracer->source_count - 1]; // the sky comes last
-    if (!counts(settings, use, vertex)) return;
-    const uint32_t samples = settings->sky_weight ? settings->sky_weight[target] : 0;
-    const float weight = vertex == 0 ? lx_direct_sky_weight(tracer, direction, cosine, samples) : lx_sky_weight(tracer, direction, cosine);
-    const lx_rgb light = lx_rgb_scale(lx_rgb_mul(throughput, lx_sky_radiance(&tracer->sky, direction)), LX_PI);
-    if (vertex == 0 && out->sky_light) out->sky_light[target] = lx_rgb_add(out->sky_light[target], light);
-    add_light(settings, sums_for(out, vertex), target, use, 0, lx_rgb_scale(light, weight));
+    if (!counts(settings, use, f->vertex)) return;
+    lx_rgb light = lx_rgb_scale(lx_rgb_mul(f->throughput, lx_sky_radiance(&tracer->sky, direction)), LX_PI * lx_sky_weight(tracer, direction, f->cosine));
+    if (f->vertex == 0 && (settings->sky_cells || out->sky_seen)) {
+        const uint32_t cell = lx_sky_cell_of(direction_point(f->stream, f->sample, 0), settings->sky_cell_count);
+        if (out->sky_seen) out->sky_seen[f->target] |= (uint64_t)1 << cell;
+        if (out->sky_seen && f->passes > 0) out->sky_through[f->target] |= (uint64_t)1 << cell;
+        if (settings->sky_cells) light = lx_rgb_scale(light, 1 - lx_sky_samples_share(lx_sky_cell_weight(&settings->sky_cells[f->target], cell)));
+    }
+    add_light(settings, sums_for(out, f->vertex), f->target, use, 0, light);
 }
 
 static void add_emission(const lx_gather_settings *settings, const lx_gather_output *out, const flight *f, const lx_ray *ray, const lx_hit *hit,
@@ -180,21 +187,12 @@ static void add_emission(const lx_gather_settings *settings, const lx_gather_out
 
 // ---- directions -------------------------------------------------------------------------------------------------------------------
 
-// Cosine-weighted around +Z; pdf = cos(theta) / pi ([PBR4] A.5.3 on a disk in polar coordinates).
-static inline lx_vec3 cosine_direction(lx_vec2 u)
-{
-    float sine, cosine;
-    lx_sincos_of_turn(u.y, &sine, &cosine);
-    const float radius = sqrtf(u.x);
-    return (lx_vec3){radius * cosine, radius * sine, sqrtf(1 - u.x)};
-}
-
 // Local directions of rays: [PBR4]'s cosine-weighted ones of a Sobol point each, in plain loops that compilers turn into vectors.
 static inline __attribute__((always_inline)) void make_directions(const direction_keys *restrict keys, size_t count, float *restrict x, float *restrict y,
                                                                   float *restrict z)
 {
     for (size_t i = 0; i < count; ++i) {
-        const lx_vec3 d = cosine_direction(lx_sobol_pair(keys->samples[i], dimension_key(keys->streams[i], keys->vertices[i], dimension_bounce)));
+        const lx_vec3 d = lx_sample_polar_hemisphere(direction_point(keys->streams[i], keys->samples[i], keys->vertices[i]));
         x[i] = d.x;
         y[i] = d.y;
         z[i] = d.z;
@@ -441,7 +439,8 @@ static size_t look_up(lx_gather_batch *b, const lx_gather_settings *settings, co
         const lx_gather_start *start = &starts[b->found[i]];
         if (i + triangles_ahead < made) fetch_triangle(settings->lookup, hit + triangles_ahead);
         if (hit->surface == LX_MISS) {
-            add_sky(settings, out, (lx_rgb){1, 1, 1}, b->cosines[i], start->target, b->rays[i].direction, 0);
+            const flight f = first_flight(start, b->cosines[i]);
+            add_sky(settings, out, &f, b->rays[i].direction);
             continue;
         }
         const lx_lookup_surface *surface = &settings->lookup->surfaces[hit->surface];
@@ -570,7 +569,7 @@ static lx_result finish_simple(lx_gather_batch *b, const lx_gather_settings *set
         if (i % block_size == 0) ask_block(b, settings, i, *count, taps);
         if (hit->surface == LX_MISS) {
             if (brings(settings, f, settings->tracer->source_count - 1)) // the sky, if there is one
-                add_sky(settings, out, f->throughput, f->cosine, f->target, b->slow_rays[i].direction, f->vertex);
+                add_sky(settings, out, f, b->slow_rays[i].direction);
             continue;
         }
         const lx_lookup_surface *surface = &settings->lookup->surfaces[hit->surface];

@@ -10,6 +10,7 @@
 
 #include "bake/lookup.h"
 #include "bake/rows.h"
+#include "trace/sky_cells.h"
 
 /// What near hits take of a luxel beside its row of direct light.
 typedef struct lx_gather_luxel {
@@ -36,7 +37,8 @@ typedef struct lx_gather_settings {
     const uint16_t *rows_later; ///< What later hits read: all bounces but two.
     const uint16_t *rows_direct; ///< Light straight from sources that are not near, for hits too near for all light to be looked up. NULL: they get light samples.
     const lx_gather_luxel *luxels; ///< [luxel], for rows_direct and near_met.
-    const uint8_t *sky_weight;  ///< [target] samples that share the light of a uniform sky with a first ray (lx_direct_tile). NULL: none do.
+    const lx_sky_cells *sky_cells; ///< [target] where samples share the light of a uniform sky with first rays (lx_direct_tile). NULL: nowhere.
+    uint32_t sky_cell_count;
     float near_texels;          ///< Hits nearer than so many texels of their surface are not looked up.
 } lx_gather_settings;
 
@@ -61,7 +63,8 @@ typedef struct lx_gather_extras {
 typedef struct lx_gather_output {
     float *sums;             ///< [target][3][row_layers], added to.
     float *met;              ///< Likewise, what the first rays themselves meet of light sources. NULL: that goes to `sums` too.
-    lx_rgb *sky_light;       ///< [target] added to: what first rays meet of the sky, without weight. NULL: not wanted.
+    uint64_t *sky_seen;      ///< [target] bit k: first rays met the sky in cell k of sky_cell_count. NULL: not wanted.
+    uint64_t *sky_through;   ///< Likewise, through a pane.
     float *near_met;         ///< As `met`, of emissive sources that are near luxel `targets`[target]. NULL: that goes to `met`.
     const uint32_t *targets; ///< [target] its luxel, beside near_met.
     float *distances;        ///< [start] to the first hit; INFINITY: none. NULL: not wanted.

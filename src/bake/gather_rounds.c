@@ -29,7 +29,7 @@ static size_t make_starts(const lx_gather_job *g, lx_gather_scratch *s, uint32_t
         const uint32_t straight = first_site + site_count <= lx_site_count ? site_count : lx_site_count - first_site;
         lx_gather_place_sites(g, s, i, first_site, straight, sites);
         if (straight < site_count) lx_gather_place_sites(g, s, i, 0, site_count - straight, sites + straight);
-        s->sky_weight[i - first] = s->sky_weight[lx_gather_chunk_luxels + i - first] = g->sky_weight[s->luxel[i]];
+        if (g->samples_sky) s->sky_cells[i - first] = s->sky_cells[lx_gather_chunk_luxels + i - first] = g->sky_cells[s->luxel[i]];
         for (uint32_t k = 0; k < n; ++k)
             s->starts[count++] = (lx_gather_start){.receiver = &sites[k / rays_per_site % site_count], .stream = s->stream[i],
                                                    .sample = g->round_first + k, .target = (k < half ? 0u : lx_gather_chunk_luxels) + i - first};
@@ -85,8 +85,9 @@ static lx_result trace_beside(const lx_gather_job *g, lx_gather_scratch *s, cons
     lx_receiver sites[lx_site_count];
     lx_gather_place_sites(g, s, index, 0, lx_site_count, sites);
     lx_gather_settings own = *settings;
-    const uint8_t sky_weight[2] = {g->sky_weight[s->luxel[index]], g->sky_weight[s->luxel[index]]};
-    own.sky_weight = sky_weight;
+    lx_sky_cells sky_cells[2] = {{0, 0}, {0, 0}};
+    if (g->samples_sky) sky_cells[0] = sky_cells[1] = g->sky_cells[s->luxel[index]];
+    own.sky_cells = g->samples_sky ? sky_cells : NULL;
     size_t count = 0;
     for (uint32_t k = 0; k < n * more; ++k)
         s->starts[count++] = (lx_gather_start){.receiver = &sites[k / rays_per_site % lx_site_count], .stream = lx_hash_combine(s->stream[index], beside_rays),
@@ -198,7 +199,8 @@ static lx_result gather_tile(void *user, size_t task, uint32_t worker, lx_error 
     lx_gather_list_luxels(g, tile, true, s);
     const uint32_t chunk = lx_gather_chunk_luxels;
     lx_gather_settings settings = g->settings;
-    settings.sky_weight = s->sky_weight;
+    settings.sky_cells = g->samples_sky ? s->sky_cells : NULL;
+    settings.sky_cell_count = g->pass_rays;
     for (uint32_t first = 0; first < s->count; first += chunk) {
         if (lx_pool_is_stopping(g->bake->scene->context->pool)) return LX_OK;
         const uint32_t end = first + chunk < s->count ? first + chunk : s->count;

@@ -5,6 +5,7 @@
 #include "base/clock.h"
 #include "base/error.h"
 #include "base/memory.h"
+#include "trace/tracer_data.h"
 
 // What gathering keeps, in bytes.
 static const struct {
@@ -12,7 +13,8 @@ static const struct {
     uint32_t luxel;           // what near hits take of it
     uint32_t pass_ray;        // and ray of the passes: the luxel it hit,
     uint32_t extra;           // and what paths that went on found, on average
-    uint32_t sum;             // estimate of the sum of all layers, how close what is around is, by what knots the luxel is interpolated, and whether the sky is sampled
+    uint32_t sum;             // estimate of the sum of all layers, how close what is around is, and by what knots the luxel is interpolated
+    uint32_t sky_cells;       // where a sky of one colour is sampled
     uint32_t estimate;        // and layer: direct light; indirect light as well, where before it
     uint32_t radiosity;       // and layer, layers padded, was what passes added up to
     uint32_t met;             // and layer whose light gather rays meet: a part of its direct light
@@ -29,7 +31,8 @@ static const struct {
     .luxel = sizeof(lx_gather_luxel),
     .pass_ray = sizeof(uint32_t),
     .extra = 40,
-    .sum = 6 * sizeof(float) + 2 * sizeof(uint8_t),
+    .sum = 6 * sizeof(float) + sizeof(uint8_t),
+    .sky_cells = sizeof(lx_sky_cells),
     .estimate = sizeof(lx_estimate),
     .radiosity = 3 * sizeof(float),
     .met = sizeof(lx_estimate),
@@ -89,6 +92,7 @@ static uint64_t group_bytes(const lx_bake_job *job, const lx_finish *finish, uin
     const uint64_t met = met_layer_count(bake) < layers ? met_layer_count(bake) : layers;
     uint64_t cache = lookup_bytes(bake) + workers * (cost.batches + cost.worker_row * padded + (uint64_t)cost.worker_cell * largest_cell_count(bake));
     cache += luxels * cost.met * met;
+    if (lx_sky_is_uniform(&bake->tracer->sky)) cache += luxels * cost.sky_cells;
     if (bounces) cache += luxels * (cost.luxel + cost.pass_ray * lx_gather_pass_rays(bake->desc.samples) + cost.extra + (cost.rows + (truncated ? cost.pass_rows : 0)) * lx_row_stride((uint32_t)padded) * sizeof(uint16_t));
     const uint64_t finishing = lx_finish_worker_bytes(finish) * (layers < workers ? layers : workers); // the cache is gone by then
     return estimates + (cache > finishing ? cache : finishing);

@@ -11,8 +11,8 @@
 // Where `noise` is given, the number of samples grows fourfold at a time, and a luxel that is sure enough of its light needs no more; where the source gives
 // next to nothing, little is enough.
 //
-// A uniform sky is no lamp: nearly all luxels see a part of it, and in a room its last hundredth may be all the light there is. No looks are taken; how many samples a luxel
-// takes is for others to say (lx_direct_tile.sky_weight).
+// A uniform sky is no lamp: nearly all luxels see a part of it, and in a room its last hundredth may be all the light there is. No looks are taken; which directions of a luxel
+// samples look into is for others to say (lx_direct_tile.sky_cells).
 //
 // A luxel's samples are cut into four runs. Each is a well-spread set in itself, and what they disagree by tells the variance of their mean; but together they are spread still
 // better, so it tells too much. How much is seen from pairs of runs that disagree less than runs do, over all luxels of the tile (see gain_of).
@@ -21,6 +21,7 @@
 #include "base/memory.h"
 #include "math/sobol.h"
 #include "trace/light_sample.h"
+#include "trace/sampling.h"
 #include "trace/source_view.h"
 #include "trace/tracer_data.h"
 
@@ -95,9 +96,9 @@ typedef struct job {
     const lx_tracer *tracer;
     const lx_direct_tile *tile;
     uint32_t source, key, cells, weight;
-    uint32_t samples; // of a luxel, at most (of a uniform sky, times its weight there)
+    uint32_t samples; // of a luxel, at most
     uint32_t first_samples; // of which so many come first, then four times as many, and so on
-    bool is_sharp, is_uniform_sky;
+    bool is_sharp;
     bool is_beside; // nearness may be more than 1
     uint32_t viewed; // luxel that the view is of; most_luxels: none yet
     spread even, shadowed; // of luxels whose shadows are known, and of others
@@ -144,11 +145,6 @@ uint32_t lx_direct_sample_weight(const lx_tracer *tracer, uint32_t source)
 {
     const uint32_t wanted = (lx_tracer_cell_count(tracer, source) + cells_per_share - 1) / cells_per_share;
     return wanted < most_monitor_share ? wanted : most_monitor_share;
-}
-
-float lx_direct_sky_weight(const lx_tracer *tracer, lx_vec3 direction, float cosine, uint32_t count)
-{
-    return lx_sky_is_uniform(&tracer->sky) ? lx_uniform_sky_weight(count) : lx_sky_weight(tracer, direction, cosine);
 }
 
 // ---- tiles and sources --------------------------------------------------------------------------------------------------------
@@ -216,11 +212,6 @@ static bool is_sharp(const lx_tracer *tracer, uint32_t source)
 
 // ---- samples ------------------------------------------------------------------------------------------------------------------
 
-static uint32_t weight_at(const job *j, uint32_t luxel)
-{
-    return j->is_uniform_sky && j->tile->sky_weight ? j->tile->sky_weight[luxel] : j->weight;
-}
-
 // Beside a small lamp light is so bright, and changes so much over a luxel, that a few such luxels hold most of a picture's error: they take more samples.
 static uint32_t nearness(const job *j, uint32_t luxel)
 {
@@ -246,7 +237,7 @@ static bool may_be_beside(const job *j)
 
 static uint32_t most_samples(const job *j, uint32_t luxel)
 {
-    return j->samples / j->weight * weight_at(j, luxel) * nearness(j, luxel);
+    return j->samples * nearness(j, luxel);
 }
 
 static void see(job *j, uint32_t luxel)
@@ -264,7 +255,7 @@ static uint32_t key_at(const job *j, uint32_t luxel)
 // Against a luxel's gather rays.
 static uint32_t count_at(const job *j, uint32_t luxel)
 {
-    return j->tile->alone && j->tile->alone[luxel] ? 0 : weight_at(j, luxel);
+    return j->tile->alone && j->tile->alone[luxel] ? 0 : j->weight;
 }
 
 // Sixteen of a luxel's samples, from number `first` on, a multiple of 16. False: nothing arrives.
@@ -281,12 +272,6 @@ static lx_ray ray_of(const lx_direct_batch *b, uint32_t k)
     const lx_view_vectors *origin = &b->view.origin, *direction = &b->samples.direction;
     return (lx_ray){.origin = {origin->x[k], origin->y[k], origin->z[k]}, .direction = {direction->x[k], direction->y[k], direction->z[k]},
                     .t_max = b->view.t_max};
-}
-
-static bool take_sky_sample(const job *j, uint32_t luxel, uint32_t i, lx_ray *ray, lx_rgb *light)
-{
-    const lx_receiver *site = &j->tile->sites[(size_t)luxel * lx_direct_sites + i % lx_direct_sites];
-    return lx_sample_uniform_sky(j->tracer, site, lx_sobol_pair(i, key_at(j, luxel)), count_at(j, luxel), ray, light);
 }
 
 static void trace_rays(const job *j, size_t count)
@@ -587,18 +572,13 @@ static void send(job *j, queue *q, const lx_ray *ray, lx_rgb light, uint32_t cel
 static void send_samples(job *j, queue *q, uint32_t luxel, uint32_t first, uint32_t end)
 {
     lx_direct_batch *b = j->b;
-    lx_ray ray;
-    for (uint32_t i = first; j->is_uniform_sky && i < end; ++i) {
-        lx_rgb light;
-        if (take_sky_sample(j, luxel, i, &ray, &light)) send(j, q, &ray, light, 0, i);
-    }
-    for (uint32_t i = first; !j->is_uniform_sky && i < end;) {
+    for (uint32_t i = first; i < end;) {
         const uint32_t block = i / lx_direct_sites * lx_direct_sites, block_end = block + lx_direct_sites < end ? block + lx_direct_sites : end;
         if (!take_samples(j, luxel, block)) return;
         for (; i < block_end; ++i) {
             const uint32_t k = i - block;
             if (lx_rgb_is_black(b->samples.light[k])) continue;
-            ray = ray_of(b, k);
+            const lx_ray ray = ray_of(b, k);
             send(j, q, &ray, b->samples.light[k], b->samples.cell[k], i);
         }
     }
@@ -627,7 +607,6 @@ static bool is_sure(const job *j, uint32_t slot, uint32_t samples)
     const lx_rgb sum = j->b->sums[slot];
     const float mean = (sum.r + sum.g + sum.b) * (1.0f / 3) / (float)samples, allowed = shadowed_share * j->noise * lx_max(mean, j->least);
     const float variance = variance_of_mean(j->b->run_sums[slot], runs / (float)samples);
-    if (j->is_uniform_sky && !(variance > 0)) return false; // samples that all saw sky, or none, know nothing of the little that they missed
     return variance <= allowed * allowed;
 }
 
@@ -655,6 +634,52 @@ static void sum_shadowed(job *j, const uint16_t *list, uint32_t list_count, lx_r
     }
 }
 
+// ---- a sky of one colour ---------------------------------------------------------------------------------------------------------
+
+// Looks into a cell of a luxel, if samples are to do so, after `count` rays that are still to be traced; returns how many are after it.
+static size_t look_into_cell(const job *j, uint32_t luxel, uint32_t slot, uint32_t cell, size_t count)
+{
+    lx_direct_batch *b = j->b;
+    const lx_direct_tile *tile = j->tile;
+    const bool alone = tile->alone && tile->alone[luxel];
+    const uint32_t weight = lx_sky_cell_weight(&tile->sky_cells[luxel], cell), usual = j->samples > tile->sky_cell_count ? j->samples / tile->sky_cell_count : 1;
+    const uint32_t samples = usual * (alone && weight == 0 ? 1 : weight), stream = lx_hash_combine(tile->stream[luxel], j->key), key = lx_hash_combine(stream, cell);
+    const float share = alone ? 1 : lx_sky_samples_share(weight);
+    for (uint32_t i = 0; i < samples; ++i) {
+        const lx_receiver *site = &tile->sites[(size_t)luxel * lx_direct_sites + (4 * (cell + stream) + i) % lx_direct_sites];
+        const lx_vec2 u = lx_sky_point_in(cell, lx_sobol_pair(i, key), tile->sky_cell_count);
+        const lx_vec3 direction = lx_to_world(site->normal, lx_sample_polar_hemisphere(u));
+        if (!(lx_dot(direction, site->geometric_normal) > 0)) continue;
+        b->rays[count] = (lx_ray){.origin = lx_offset_origin(site->position, site->geometric_normal), .direction = direction, .t_max = INFINITY};
+        b->light[count] = lx_rgb_grey(share * LX_PI / (float)(tile->sky_cell_count * samples));
+        b->owner[count] = slot;
+        b->run[count] = (uint8_t)((i * runs / samples + cell) % runs);
+        if (++count < ray_batch) continue;
+        finish_sums(j, count);
+        count = 0;
+    }
+    return count;
+}
+
+static bool light_from_sky(job *j, lx_rgb *mean, float *variance)
+{
+    const lx_direct_tile *tile = j->tile;
+    const uint64_t before = j->b->ray_count;
+    for (uint32_t first = 0; first < tile->count; first += chunk_luxels) {
+        const uint32_t end = first + chunk_luxels < tile->count ? first + chunk_luxels : tile->count;
+        size_t count = 0;
+        clear_sums(j, chunk_luxels);
+        for (uint32_t i = first; i < end; ++i)
+            for (uint32_t cell = 0; cell < tile->sky_cell_count; ++cell)
+                count = look_into_cell(j, i, i - first, cell, count);
+        finish_sums(j, count);
+        for (uint32_t i = first; i < end; ++i) store(j, &j->shadowed, i, i - first, 1, (lx_rgb){1, 1, 1}, mean, variance);
+    }
+    const float gain = gain_of(&j->shadowed);
+    for (uint32_t i = 0; i < tile->count; ++i) variance[i] *= gain;
+    return j->b->ray_count > before;
+}
+
 bool lx_direct_light(lx_direct_batch *b, const lx_direct_settings *settings, const lx_direct_tile *tile, uint32_t source, lx_rgb *mean,
                      float *variance)
 {
@@ -663,18 +688,21 @@ bool lx_direct_light(lx_direct_batch *b, const lx_direct_settings *settings, con
     // Random numbers as the path integrator takes them for the light samples at the start of a path: vertex 0.
     job j = {.b = b, .tracer = tracer, .tile = tile, .source = source, .key = lx_hash_combine(tracer->source_keys[source], 0),
              .cells = lx_tracer_cell_count(tracer, source), .weight = lx_direct_sample_weight(tracer, source)};
+    if (is_uniform_sky(tracer, source)) {
+        j.samples = settings->samples;
+        return light_from_sky(&j, mean, variance);
+    }
     j.is_sharp = is_sharp(tracer, source);
     j.samples = j.is_sharp ? (uint32_t)lx_direct_sites : settings->samples * j.weight;
     j.first_samples = j.samples;
     j.is_beside = may_be_beside(&j);
-    j.is_uniform_sky = is_uniform_sky(tracer, source);
     j.viewed = most_luxels;
     j.noise = settings->noise;
     j.least = darkest * 20 * tracer->source_scales[source]; // which are a twentieth of the mean
     // A monitor's cells must each be sure; and without a bound nothing ends early.
     if (j.cells == 1 && j.noise > 0) j.first_samples = first_step(j.first_samples);
     memset(b->luxels, 0, tile->count * sizeof *b->luxels);
-    if (!settings->all_rays && !j.is_uniform_sky) {
+    if (!settings->all_rays) {
         place_on_grid(b, tile);
         look_where_it_matters(&j);
     }
@@ -693,7 +721,6 @@ bool lx_direct_light(lx_direct_batch *b, const lx_direct_settings *settings, con
             continue;
         }
         if (!s->possible && s->looked == lx_direct_sites) continue; // behind every site's horizon
-        if (weight_at(&j, i) == 0) continue;
         b->list[count++] = (uint16_t)i;
     }
     for (uint32_t first = 0; first < count; first += chunk)

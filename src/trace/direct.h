@@ -6,6 +6,7 @@
 #ifndef LX_TRACE_DIRECT_H
 #define LX_TRACE_DIRECT_H
 
+#include "trace/sky_cells.h"
 #include "trace/tracer.h"
 
 enum { lx_direct_sites = 16 }; ///< Receivers per luxel.
@@ -26,7 +27,8 @@ typedef struct lx_direct_tile {
     const uint32_t *stream;     ///< [count] key of the luxel's random numbers.
     const lx_receiver *sites;   ///< [count][lx_direct_sites]
     const uint8_t *alone;       ///< [count] true: no gather rays leave the luxel, samples bring all light. NULL: they leave all.
-    const uint8_t *sky_weight;  ///< [count] of a uniform sky: so many times the usual samples share the work against the luxel's gather rays, 0, 1 or a power of 4. NULL: 1.
+    const lx_sky_cells *sky_cells; ///< [count] where samples of a uniform sky look besides the luxel's gather rays.
+    uint32_t sky_cell_count;
     const lx_direct_bounds *bounds; ///< Of the sites, once for all sources; NULL: no source is left out at once.
 } lx_direct_tile;
 
@@ -47,15 +49,12 @@ uint64_t lx_direct_batch_rays(const lx_direct_batch *batch);
 
 /// Irradiance of source `source` at unit strength: mean over the sites, with the variance of that mean. The share of emissive surfaces and
 /// skies that cosine-weighted rays find better is left out: samples are weighed as `lx_sample_source(count = lx_direct_sample_weight)` says, hits have
-/// lx_hit_weight with the same count, rays that leave the scene lx_direct_sky_weight. `mean`: [cell][luxel of the tile] rgb; `variance`: [cell][luxel], of the mean of the channels.
+/// lx_hit_weight with the same count, rays that leave the scene lx_sky_weight or, of a uniform sky, what lx_sky_samples_share leaves. `mean`: [cell][luxel of the tile] rgb; `variance`: [cell][luxel], of the mean of the channels.
 /// False: nothing arrives anywhere in the tile; what `mean` and `variance` hold is undefined.
 bool lx_direct_light(lx_direct_batch *batch, const lx_direct_settings *settings, const lx_direct_tile *tile, uint32_t source, lx_rgb *mean,
                      float *variance);
 
 /// The `count` that weighs samples of a source against one cosine-weighted ray: 1 but for monitors. A matter of the source alone.
 uint32_t lx_direct_sample_weight(const lx_tracer *tracer, uint32_t source);
-
-/// Weight of a cosine-weighted ray that left a luxel and then the scene, against the samples of lx_direct_light. `count`: lx_direct_tile.sky_weight of the luxel.
-float lx_direct_sky_weight(const lx_tracer *tracer, lx_vec3 direction, float cosine, uint32_t count);
 
 #endif

@@ -113,25 +113,6 @@ static bool sample_sky(const lx_tracer *tracer, const lx_receiver *r, lx_vec2 u,
     return true;
 }
 
-// Densities are equal, so looks of either kind would count alike; but a ray that misses the sky meets what shines a little like it, and the errors of both cancel in part. That is
-// lost with what samples bring, and they get so much less.
-static const float sky_samples_share = 0.9f;
-
-float lx_uniform_sky_weight(uint32_t count)
-{
-    return 1 - sky_samples_share * (float)count / (float)(count + 1);
-}
-
-bool lx_sample_uniform_sky(const lx_tracer *tracer, const lx_receiver *receiver, lx_vec2 u, uint32_t count, lx_ray *out_ray, lx_rgb *out_irradiance)
-{
-    const lx_vec3 direction = lx_to_world(receiver->normal, lx_sample_cosine_hemisphere(u));
-    if (lx_receiver_cosine(receiver, direction) == 0) return false;
-    const float weight = count == 0 ? 1 : 1 - lx_uniform_sky_weight(count);
-    *out_irradiance = lx_rgb_scale(lx_sky_radiance(&tracer->sky, direction), LX_PI * weight);
-    *out_ray = ray_to_infinity(receiver, direction);
-    return true;
-}
-
 static bool sample_lamp(const lx_light *light, const lx_receiver *r, lx_vec2 u, lx_ray *ray, float *irradiance)
 {
     const lx_lamp lamp = lx_lamp_of(light);

@@ -9,8 +9,7 @@
 /// that decides. Range, spot cone, receiver's cosine, 1/pdf and, for sources that rays can hit (emissive surfaces, pictures of
 /// skies), the power-heuristic weight against cosine-weighted rays are in it; `count`: how many such samples share the work against one ray
 /// (the caller averages them); 0: no ray meets the source, samples bring all its light. `out_cell`: of the sampled point, see lx_tracer_cell_at. False: nothing arrives, no ray.
-/// A uniform sky has no samples here: the ray that goes on from a vertex meets it just as well. Where many samples of one receiver are taken,
-/// lx_sample_uniform_sky has some.
+/// A uniform sky has no samples here: the ray that goes on from a vertex meets it just as well.
 bool lx_sample_source(const lx_tracer *tracer, uint32_t source, const lx_receiver *receiver, lx_vec2 u, uint32_t count, lx_ray *out_ray,
                       lx_rgb *out_irradiance, uint32_t *out_cell);
 
@@ -18,11 +17,6 @@ bool lx_sample_source(const lx_tracer *tracer, uint32_t source, const lx_receive
 /// receivers that count little.
 bool lx_sample_source_by_power(const lx_tracer *tracer, uint32_t source, const lx_receiver *receiver, lx_vec2 u, uint32_t count, lx_ray *out_ray,
                                lx_rgb *out_irradiance, uint32_t *out_cell);
-
-/// One cosine-weighted sample of a uniform sky, else as lx_sample_source; its density is that of gather rays, so the weight is the same for all directions.
-bool lx_sample_uniform_sky(const lx_tracer *tracer, const lx_receiver *receiver, lx_vec2 u, uint32_t count, lx_ray *out_ray, lx_rgb *out_irradiance);
-/// Weight of a cosine-weighted ray that met a uniform sky, against `count` samples of lx_sample_uniform_sky; 1 without any.
-float lx_uniform_sky_weight(uint32_t count);
 
 /// Is the source so small, seen from where rays start, that samples alone bring its light? A matter of the source and the place.
 bool lx_has_samples_alone(const lx_tracer *tracer, uint32_t source, lx_vec3 origin);

@@ -9,6 +9,8 @@
 
 #include "math/vec.h"
 
+#include <stdbool.h>
+
 /// Sine and cosine of 2 pi t, t in [0, 1): Taylor series about the nearest quarter turn, within a few roundings; no branches and no calls, so that loops stay tight.
 LX_INLINED void lx_sincos_of_turn(float t, float *sine, float *cosine)
 {
@@ -43,6 +45,15 @@ static inline lx_vec3 lx_sample_cosine_hemisphere(lx_vec2 u)
 {
     const lx_vec2 d = lx_sample_disk(u);
     return (lx_vec3){d.x, d.y, sqrtf(lx_max(0.0f, 1 - d.x * d.x - d.y * d.y))};
+}
+
+/// The same as lx_sample_cosine_hemisphere by a disk in polar coordinates: rings and sectors of the unit square are rings and sectors of directions.
+LX_INLINED lx_vec3 lx_sample_polar_hemisphere(lx_vec2 u)
+{
+    float sine, cosine;
+    lx_sincos_of_turn(u.y, &sine, &cosine);
+    const float radius = sqrtf(u.x);
+    return (lx_vec3){radius * cosine, radius * sine, sqrtf(1 - u.x)};
 }
 
 /// Uniform direction within a cone around +Z, given 1 - cos(half angle), which keeps its precision for narrow cones.

@@ -1,12 +1,13 @@
 // Direct light of a tile against brute force: every kind of source, half of the tile under a shade.
 #include "trace/direct.h"
 #include "trace/light_sample.h"
+#include "trace/sampling.h"
 #include "trace/source_view.h"
 #include "trace/tracer_data.h"
 #include "math/sobol.h"
 #include "unit/scene_fixture.h"
 
-enum { edge = 10, luxels = edge * edge, samples = 64, brute_samples = 16 * 200, most_cells = 6 };
+enum { edge = 10, luxels = edge * edge, samples = 64, brute_samples = 16 * 200, most_cells = 6, sky_cell_count = 16 };
 
 // Two squares, one of them with texture coordinates (a monitor needs them); a lamp of every kind above or beside the tile.
 static const char members[] =
@@ -41,7 +42,7 @@ typedef struct fixture {
     lx_receiver sites[luxels * lx_direct_sites];
     uint16_t place[luxels];
     uint32_t chart[luxels], stream[luxels];
-    uint8_t flags[luxels];
+    lx_sky_cells sky_cells[luxels];
     lx_direct_tile tile;
 } fixture;
 
@@ -62,13 +63,15 @@ static void begin(fixture *f, uint32_t seed)
     for (uint32_t i = 0; i < luxels; ++i) {
         f->place[i] = (uint16_t)(i / edge * 32 + i % edge);
         f->stream[i] = lx_hash_combine(seed, i);
+        f->sky_cells[i] = (lx_sky_cells){lx_hash32(i), lx_hash32(i + 1000)}; // some of each kind, some of none
         for (uint32_t s = 0; s < lx_direct_sites; ++s) { // 4 × 4 in luxels of 0.4 m
             const float x = ((float)(i % edge) + ((float)(s % 4) + 0.5f) / 4) * 0.4f - 2;
             const float z = ((float)(i / edge) + ((float)(s / 4) + 0.5f) / 4) * 0.4f - 2;
             f->sites[i * lx_direct_sites + s] = (lx_receiver){.position = {x, 0, z}, .normal = {0, 1, 0}, .geometric_normal = {0, 1, 0}};
         }
     }
-    f->tile = (lx_direct_tile){.count = luxels, .place = f->place, .chart = f->chart, .stream = f->stream, .sites = f->sites};
+    f->tile = (lx_direct_tile){.count = luxels, .place = f->place, .chart = f->chart, .stream = f->stream, .sites = f->sites,
+                             .sky_cells = f->sky_cells, .sky_cell_count = sky_cell_count};
 }
 
 static void end(fixture *f)
@@ -84,6 +87,13 @@ static uint32_t source_number(const fixture *f, const char *name)
     return (uint32_t)(source_named(f->scene, name) - f->scene->sources);
 }
 
+// One cosine-weighted look at a uniform sky: samples have their share of it, gather rays the rest.
+static lx_ray look_at_sky(const fixture *f, uint32_t luxel, const lx_receiver *site, lx_vec2 u, float *light)
+{
+    *light = LX_PI * lx_sky_samples_share(lx_sky_cell_weight(&f->sky_cells[luxel], lx_sky_cell_of(u, sky_cell_count)));
+    return (lx_ray){.origin = lx_offset_origin(site->position, site->geometric_normal), .direction = lx_to_world(site->normal, lx_sample_polar_hemisphere(u)), .t_max = INFINITY};
+}
+
 // Independent samples of one luxel: mean and variance of one sample, per cell.
 static void brute_force(const fixture *f, uint32_t source, uint32_t luxel, double mean[most_cells], double variance[most_cells])
 {
@@ -97,7 +107,9 @@ static void brute_force(const fixture *f, uint32_t source, uint32_t luxel, doubl
         uint32_t cell;
         const lx_receiver *site = &f->sites[luxel * lx_direct_sites + i % lx_direct_sites];
         if (source == f->scene->source_count) {
-            if (!lx_sample_uniform_sky(f->tracer, site, u, count, &ray, &light)) continue;
+            float share;
+            ray = look_at_sky(f, luxel, site, u, &share);
+            light = lx_rgb_grey(share);
             cell = 0;
         } else if (!lx_sample_source(f->tracer, source, site, u, count, &ray, &light, &cell)) {
             continue;
@@ -166,8 +178,7 @@ static void source_below_the_horizon_gives_nothing_without_a_ray(void **state)
 
 static void uniform_skies_give_what_brute_force_does(void **state) { (void)state; check_source("sky"); }
 
-// Samples and rays that miss everything share the light of a uniform sky: what the one lacks of it the other has, by whatever number of samples. Where rays or
-// samples are alone they have all.
+// In the open all looks agree, so the light is exact: samples bring their share of their cells, gather rays the rest, and where none leave samples bring all.
 static void samples_and_rays_share_all_light_of_a_uniform_sky(void **state)
 {
     (void)state;
@@ -175,30 +186,46 @@ static void samples_and_rays_share_all_light_of_a_uniform_sky(void **state)
     begin(&f, 1);
     const uint32_t source = source_number(&f, "sky");
     for (uint32_t i = 0; i < luxels * lx_direct_sites; ++i) f.sites[i].position.y += 10; // above everything
-    static const uint8_t counts[] = {0, 1, 4};
     uint8_t alone[luxels];
+    uint32_t wanted = 0;
+    f.sky_cells[0] = f.sky_cells[1] = (lx_sky_cells){0, 0};
     for (uint32_t i = 0; i < luxels; ++i) {
-        f.flags[i] = counts[i % 3];
-        alone[i] = i % 3 > 0 && i % 2;
+        alone[i] = i % 2;
+        for (uint32_t k = 0; k < sky_cell_count; ++k) {
+            const uint32_t weight = lx_sky_cell_weight(&f.sky_cells[i], k);
+            wanted += samples / sky_cell_count * (alone[i] && weight == 0 ? 1 : weight);
+        }
     }
+    f.tile.alone = alone;
     lx_rgb mean[luxels];
     float variance[luxels];
     const lx_direct_settings settings = {.tracer = f.tracer, .samples = samples};
-    const lx_vec3 up = {0, 1, 0};
-    const float ray = lx_direct_sky_weight(f.tracer, up, 1, 1), ray_of_4 = lx_direct_sky_weight(f.tracer, up, 1, 4);
-    assert_true(ray > ray_of_4 && ray < 1 && ray_of_4 > 0 && lx_direct_sky_weight(f.tracer, up, 1, 0) == 1);
-    assert_true(lx_direct_light(f.batch, &settings, &f.tile, source, mean, variance));
-    for (uint32_t i = 0; i < luxels; ++i) assert_near((double)(mean[i].g + ray * LX_PI), (double)LX_PI, 1e-5);
-    f.tile.sky_weight = f.flags;
-    f.tile.alone = alone;
-    const uint64_t before = lx_direct_batch_rays(f.batch);
     assert_true(lx_direct_light(f.batch, &settings, &f.tile, source, mean, variance));
     for (uint32_t i = 0; i < luxels; ++i) {
-        const float rays_bring = alone[i] ? 0 : lx_direct_sky_weight(f.tracer, up, 1, f.flags[i]);
-        assert_near((double)(mean[i].g + rays_bring * LX_PI), (double)LX_PI, 1e-5);
+        float rays_bring = 0;
+        for (uint32_t k = 0; k < sky_cell_count && !alone[i]; ++k) rays_bring += (1 - lx_sky_samples_share(lx_sky_cell_weight(&f.sky_cells[i], k))) / sky_cell_count;
+        assert_near((double)(mean[i].g + rays_bring * LX_PI), (double)LX_PI, 3e-5);
+        assert_true(variance[i] < 1e-9f);
     }
-    assert_int_equal(lx_direct_batch_rays(f.batch) - before, samples * (33 * 1 + 33 * 4)); // 34 luxels take none
+    assert_int_equal(lx_direct_batch_rays(f.batch), wanted);
     end(&f);
+}
+
+// Points drawn in a cell lie in it, and cells are all of the square, in equal parts.
+static void cells_of_the_sky_are_equal_parts(void **state)
+{
+    (void)state;
+    for (uint32_t count = 1; count <= lx_sky_most_cells; count *= 2) {
+        uint32_t found[lx_sky_most_cells] = {0};
+        enum { grid = 64 };
+        for (uint32_t i = 0; i < grid * grid; ++i) {
+            const lx_vec2 u = {((float)(i % grid) + 0.5f) / grid, ((float)(i / grid) + 0.5f) / grid};
+            ++found[lx_sky_cell_of(u, count)];
+            assert_int_equal(lx_sky_cell_of(lx_sky_point_in(i % count, u, count), count), i % count);
+        }
+        for (uint32_t k = 0; k < count; ++k) assert_int_equal(found[k], grid * grid / count);
+    }
+    assert_int_equal(lx_sky_cell_of((lx_vec2){0x1.fffffep-1f, 0x1.fffffep-1f}, 64), 63);
 }
 
 // Samples by power bring what samples by the tree bring, seen from near, where hits have a share, and from far, where they have none.
@@ -411,6 +438,7 @@ int main(void)
         cmocka_unit_test(samples_by_power_bring_the_same_light),
         cmocka_unit_test(views_give_the_samples_of_the_source),
         cmocka_unit_test(samples_and_rays_share_all_light_of_a_uniform_sky),
+        cmocka_unit_test(cells_of_the_sky_are_equal_parts),
         cmocka_unit_test(paths_take_no_samples_of_a_uniform_sky),
         cmocka_unit_test(a_sliver_of_sky_is_not_lost),
         cmocka_unit_test(source_below_the_horizon_gives_nothing_without_a_ray),
