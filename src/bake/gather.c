@@ -63,10 +63,10 @@ static lx_result create_scratch(lx_gather_job *g, uint32_t workers, uint32_t rou
         s->near_light = lx_malloc_array(lx_gather_tile_luxels, g->stride * sizeof *s->near_light);
         s->mean = lx_malloc_array(cells * lx_gather_tile_luxels, sizeof *s->mean);
         s->variance = lx_malloc_array(cells * lx_gather_tile_luxels, sizeof *s->variance);
-        s->is_beside = lx_malloc_array(g->layer_count, sizeof *s->is_beside);
+        s->efforts = lx_malloc_array(g->layer_count, sizeof *s->efforts);
         s->found = lx_malloc_array((size_t)lx_gather_chunk_luxels * lx_gather_most_pass_rays, sizeof *s->found);
         s->distances = lx_malloc_array((size_t)lx_gather_chunk_luxels * lx_gather_most_pass_rays, sizeof *s->distances);
-        if (!s->batch || !s->direct || !s->sites || !s->starts || !s->sums || !s->met || !s->near_light || !s->mean || !s->variance || !s->is_beside || !s->found ||
+        if (!s->batch || !s->direct || !s->sites || !s->starts || !s->sums || !s->met || !s->near_light || !s->mean || !s->variance || !s->efforts || !s->found ||
             !s->distances)
             return lx_fail_memory(error, "workers");
     }
@@ -82,7 +82,7 @@ static void release_cache(lx_gather_job *g, uint32_t workers)
         if (s->direct) g->job->ray_count += lx_direct_batch_rays(s->direct);
         lx_gather_batch_destroy(s->batch);
         lx_direct_batch_destroy(s->direct);
-        void *arrays[] = {s->sites, s->starts, s->sums, s->met, s->near_light, s->mean, s->variance, s->is_beside, s->found, s->distances};
+        void *arrays[] = {s->sites, s->starts, s->sums, s->met, s->near_light, s->mean, s->variance, s->efforts, s->found, s->distances};
         for (size_t k = 0; k < sizeof arrays / sizeof *arrays; ++k) lx_free(arrays[k]);
     }
     for (uint32_t t = 0; g->extras && t < g->job->map.tile_count; ++t) lx_free(g->extras[t].items);

@@ -33,7 +33,7 @@ typedef struct lx_gather_scratch {
     uint32_t stream[lx_gather_tile_luxels], chart[lx_gather_tile_luxels];
     uint16_t place[lx_gather_tile_luxels];
     uint32_t luxel[lx_gather_tile_luxels]; // of the map
-    bool *is_beside;             // [layer_count] of lamps beside the luxel at work
+    uint8_t *efforts;            // [layer_count] at the luxel at work
     uint8_t alone[lx_gather_tile_luxels];  // it sends no gather rays
     uint64_t sky_seen[lx_gather_tile_luxels], sky_through[lx_gather_tile_luxels]; // cells in which the cache's rays met a uniform sky, and through a pane
     lx_sky_cells sky_cells[lx_gather_tile_luxels]; // of luxels of the tile, later of targets

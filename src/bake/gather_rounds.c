@@ -39,47 +39,38 @@ static size_t make_starts(const lx_gather_job *g, lx_gather_scratch *s, uint32_t
 
 // ---- beside lamps -------------------------------------------------------------------------------------------------------------
 
-// Inside a lantern or on a candle a few rays meet what the lamp lights from a texel away, and hold most of a picture's error. Such luxels send `beside_rays` times as many for
-// the layers of such lamps; other layers take no part in that, so that they do not change when lamps come and go.
-enum { beside_rays = 16 };
-static const float beside_texels = 1.5f;
+// Inside a lantern or on the wall behind a sconce a few rays meet what the lamp lights from a few centimetres away, and hold most of a picture's error. There the layers of such
+// lamps have more rays of their own (lx_source_effort); other layers take no part in them, so that they do not change when lamps come and go.
 
-// Marks the layers of small lamps beside the luxel. False: there are none.
-static bool find_beside(const lx_gather_job *g, uint32_t luxel, bool *is_beside)
+// Finds how many times the usual rays each layer has at the luxel: as many as the lamp of its own that asks for most. False: none has more.
+static bool find_efforts(const lx_gather_job *g, uint32_t luxel, uint8_t *efforts)
 {
-    const lx_tracer *tracer = g->bake->tracer;
-    if (g->settings.bounces == 0) return false;
-    const lx_gather_luxel *l = &g->luxels[luxel];
-    if (l->near_sources == 0) return false;
-    bool any = false;
-    memset(is_beside, 0, g->layer_count * sizeof *is_beside);
+    if (g->settings.bounces == 0 || !g->luxels[luxel].is_beside_lamps) return false;
+    memset(efforts, 1, g->layer_count * sizeof *efforts);
     for (uint32_t s = 0; s < g->bake->source_count; ++s) {
         const lx_source_use *use = &g->uses[s];
-        const lx_source_sphere *lamp = &tracer->source_spheres[s];
-        if (use->layer < 0 || !(l->near_sources >> s % 64 & 1) || !(lamp->power < INFINITY) || lamp->radius > beside_texels * l->texel_m) continue;
-        if (!(lx_distance(l->centre, lamp->centre) < beside_texels * l->texel_m)) continue;
-        const uint32_t layers = lx_source_use_layers(use, tracer, s);
-        for (uint32_t k = 0; k < layers; ++k) is_beside[(uint32_t)use->layer + k] = true;
-        any = true;
+        if (use->layer < 0) continue;
+        const uint32_t effort = lx_source_effort(g->bake->tracer, s, g->luxels[luxel].centre), layers = lx_source_use_layers(use, g->bake->tracer, s);
+        for (uint32_t l = (uint32_t)use->layer; l < (uint32_t)use->layer + layers; ++l)
+            if (efforts[l] < effort) efforts[l] = (uint8_t)effort;
     }
-    return any;
+    return true;
 }
 
-// The layers' sums become what all rays together would have brought to the round's own.
-static void take_beside(const lx_gather_job *g, const bool *is_beside, const float *more, float *sums)
+// Sums of the layers that have `effort` become what all rays together would have brought to the round's own.
+static void take_beside(const lx_gather_job *g, const uint8_t *efforts, uint32_t effort, const float *more, float *sums)
 {
     for (uint32_t l = 0; l < g->layer_count; ++l)
-        for (uint32_t c = 0; c < 3 && is_beside[l]; ++c) {
+        for (uint32_t c = 0; c < 3 && efforts[l] == effort; ++c) {
             const size_t at = (size_t)c * g->row_layers + l;
-            sums[at] = (sums[at] + more[at]) * (1.0f / beside_rays);
+            sums[at] = (sums[at] + more[at]) / (float)effort;
         }
 }
 
-// Further rays of luxel `index` of the list, row `index` - `first` of the sums, where it lies beside a lamp.
-static lx_result trace_beside(const lx_gather_job *g, lx_gather_scratch *s, const lx_gather_settings *settings, uint32_t first, uint32_t index, lx_error *error)
+// Further rays of luxel `index` of the list, row `index` - `first` of the sums, for the layers that have `effort` there.
+static lx_result trace_more(const lx_gather_job *g, lx_gather_scratch *s, const lx_gather_settings *settings, uint32_t effort, uint32_t first, uint32_t index, lx_error *error)
 {
-    if (!find_beside(g, s->luxel[index], s->is_beside)) return LX_OK;
-    const uint32_t n = g->round_count, half = (n + 1) / 2, more = beside_rays - 1;
+    const uint32_t n = g->round_count, half = (n + 1) / 2, more = effort - 1;
     float *sums = s->near_light, *met = s->near_light + 2 * g->stride; // of this luxel alone
     memset(sums, 0, 4 * g->stride * sizeof *sums);
     lx_receiver sites[lx_site_count];
@@ -90,16 +81,27 @@ static lx_result trace_beside(const lx_gather_job *g, lx_gather_scratch *s, cons
     own.sky_cells = g->samples_sky ? sky_cells : NULL;
     size_t count = 0;
     for (uint32_t k = 0; k < n * more; ++k)
-        s->starts[count++] = (lx_gather_start){.receiver = &sites[k / rays_per_site % lx_site_count], .stream = lx_hash_combine(s->stream[index], beside_rays),
+        s->starts[count++] = (lx_gather_start){.receiver = &sites[k / rays_per_site % lx_site_count], .stream = lx_hash_combine(s->stream[index], effort),
                                                .sample = g->round_first * more + k, .target = k < half * more ? 0 : 1};
     const lx_gather_output out = {.sums = sums, .met = g->met_estimates ? met : NULL};
     const lx_result result = lx_gather_trace(s->batch, &own, s->starts, count, &out, error);
     for (uint32_t h = 0; h < 2 && result == LX_OK; ++h) {
         const size_t row = g->stride * (index - first + h * lx_gather_chunk_luxels);
-        take_beside(g, s->is_beside, sums + h * g->stride, s->sums + row);
-        if (g->met_estimates) take_beside(g, s->is_beside, met + h * g->stride, s->met + row);
+        take_beside(g, s->efforts, effort, sums + h * g->stride, s->sums + row);
+        if (g->met_estimates) take_beside(g, s->efforts, effort, met + h * g->stride, s->met + row);
     }
     return result;
+}
+
+static lx_result trace_beside(const lx_gather_job *g, lx_gather_scratch *s, const lx_gather_settings *settings, uint32_t first, uint32_t index, lx_error *error)
+{
+    if (!find_efforts(g, s->luxel[index], s->efforts)) return LX_OK;
+    for (uint32_t effort = 2; effort <= lx_source_most_effort; effort *= 2) {
+        if (!memchr(s->efforts, (int)effort, g->layer_count)) continue;
+        const lx_result result = trace_more(g, s, settings, effort, first, index, error);
+        if (result != LX_OK) return result;
+    }
+    return LX_OK;
 }
 
 // ---- rounds ---------------------------------------------------------------------------------------------------------------------

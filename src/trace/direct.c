@@ -99,7 +99,7 @@ typedef struct job {
     uint32_t samples; // of a luxel, at most
     uint32_t first_samples; // of which so many come first, then four times as many, and so on
     bool is_sharp;
-    bool is_beside; // nearness may be more than 1
+    bool is_beside; // efforts may be more than 1
     uint32_t viewed; // luxel that the view is of; most_luxels: none yet
     spread even, shadowed; // of luxels whose shadows are known, and of others
     float noise, least; // standard error wanted, of the light or of `least`
@@ -212,32 +212,33 @@ static bool is_sharp(const lx_tracer *tracer, uint32_t source)
 
 // ---- samples ------------------------------------------------------------------------------------------------------------------
 
-// Beside a small lamp light is so bright, and changes so much over a luxel, that a few such luxels hold most of a picture's error: they take more samples.
-static uint32_t nearness(const job *j, uint32_t luxel)
+// Of all sites the one nearest to the source decides.
+static uint32_t effort_at(const job *j, uint32_t luxel)
 {
     if (!j->is_beside) return 1;
-    const lx_vec3 lamp = j->tracer->source_spheres[j->source].centre;
     const lx_receiver *sites = &j->tile->sites[(size_t)luxel * lx_direct_sites];
-    float width = 0, distance = INFINITY;
+    uint32_t most = 1;
     for (int k = 0; k < lx_direct_sites; ++k) {
-        width = lx_max(width, lx_distance(sites[k].position, sites[0].position));
-        distance = lx_min(distance, lx_distance(sites[k].position, lamp));
+        const uint32_t effort = lx_source_effort(j->tracer, j->source, sites[k].position);
+        if (effort > most) most = effort;
     }
-    return distance < width ? runs * runs : distance < 2 * width ? runs : 1;
+    return most;
 }
 
-// Can it be, of any of the tile's luxels? Their widths are at most two radii of its bounds.
+// May any of the tile's luxels have more than the usual samples?
 static bool may_be_beside(const job *j)
 {
-    const lx_source_sphere *lamp = &j->tracer->source_spheres[j->source];
-    if (j->is_sharp || j->cells > 1 || !(lamp->power < INFINITY)) return false;
     const lx_direct_bounds *bounds = j->tile->bounds;
-    return !bounds || lx_distance(bounds->centre, lamp->centre) < 5.01f * bounds->radius;
+    if (j->is_sharp || j->cells > 1) return false;
+    if (!bounds) return true;
+    const lx_vec3 lamp = j->tracer->source_spheres[j->source].centre;
+    const float distance = lx_distance(bounds->centre, lamp), nearest = lx_max(0, distance - bounds->radius);
+    return lx_source_effort(j->tracer, j->source, lx_mad(lamp, lx_sub(bounds->centre, lamp), distance > 0 ? nearest / distance : 0)) > 1;
 }
 
 static uint32_t most_samples(const job *j, uint32_t luxel)
 {
-    return j->samples * nearness(j, luxel);
+    return j->samples * effort_at(j, luxel);
 }
 
 static void see(job *j, uint32_t luxel)

@@ -99,6 +99,19 @@ float lx_source_bound(const lx_tracer *tracer, uint32_t source, const lx_receive
     return s->power * cosine / (nearest * nearest);
 }
 
+uint32_t lx_source_effort(const lx_tracer *tracer, uint32_t source, lx_vec3 place)
+{
+    static const float least_brightness = 256; // unshadowed light over the mean of all surfaces
+    const lx_source_sphere *s = &tracer->source_spheres[source];
+    const float mean = 20 * tracer->source_scales[source]; // which are a twentieth of it
+    if (!(s->power < INFINITY) || !(mean > 0)) return 1;
+    const lx_vec3 d = lx_sub(s->centre, place);
+    const float squared = lx_dot(d, d) + s->radius * s->radius; // a bulb among many in one source is no small lamp
+    uint32_t effort = 1;
+    for (float bright = least_brightness * mean; effort < lx_source_most_effort && s->power > bright * squared; bright *= 4) effort *= 4;
+    return effort;
+}
+
 static bool sample_sky(const lx_tracer *tracer, const lx_receiver *r, lx_vec2 u, uint32_t count, lx_ray *ray, lx_rgb *irradiance)
 {
     if (!lx_sky_has_samples(&tracer->sky)) return false;

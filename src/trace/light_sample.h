@@ -27,6 +27,11 @@ bool lx_source_is_small(const lx_tracer *tracer, uint32_t source, float nearest)
 /// the cone or the range, behind a one-sided lamp), infinity if nothing is known. Within the source's own bounds it is infinity too.
 float lx_source_bound(const lx_tracer *tracer, uint32_t source, const lx_receiver *receiver);
 
+enum { lx_source_most_effort = 64 };
+/// How many times the usual samples a place deserves: more than 1, up to lx_source_most_effort, beside a small lamp, where its light is hundreds of times its mean in the scene
+/// and a few luxels hold most of a picture's error. A power of 4. A matter of the source and the place.
+uint32_t lx_source_effort(const lx_tracer *tracer, uint32_t source, lx_vec3 place);
+
 /// Roulette on light samples: what brings less than `scale` is looked at with that probability and weighs accordingly more, so the expectation stays.
 /// Depends on the path (stream, sample) and its source (key) alone, never on other sources. 1 / probability; 0: skipped.
 float lx_light_roulette(uint32_t stream, uint32_t sample, uint32_t key, float brings, float scale);

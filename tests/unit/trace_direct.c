@@ -315,6 +315,27 @@ static void paths_take_no_samples_of_a_uniform_sky(void **state)
 }
 
 // A chink that few rays find: its light must not be taken for none.
+// Four times the samples for each time that a lamp is twice as near, from where its light is hundreds of times the mean.
+static void places_beside_a_lamp_deserve_more_samples(void **state)
+{
+    (void)state;
+    fixture f;
+    begin(&f, 1);
+    const uint32_t bulb = source_number(&f, "bulb"), globe = source_number(&f, "globe"), sky = source_number(&f, "sky"), sun = source_number(&f, "sun");
+    const lx_vec3 place = f.tracer->source_spheres[bulb].centre;
+    const float mean = 20 * f.tracer->source_scales[bulb], reach = sqrtf(1 / (256 * mean)); // of one candela
+    static const struct {
+        float distance; // over the reach
+        uint32_t effort;
+    } expected[] = {{100, 1}, {1.01f, 1}, {0.99f, 4}, {0.51f, 4}, {0.49f, 16}, {0.26f, 16}, {0.24f, 64}, {0, lx_source_most_effort}};
+    for (size_t i = 0; i < sizeof expected / sizeof *expected; ++i)
+        assert_int_equal(lx_source_effort(f.tracer, bulb, lx_add(place, lx_v3(0, expected[i].distance * reach, 0))), expected[i].effort);
+    assert_true(lx_source_effort(f.tracer, globe, f.tracer->source_spheres[globe].centre) <= lx_source_most_effort);
+    assert_int_equal(lx_source_effort(f.tracer, sky, place), 1);
+    assert_int_equal(lx_source_effort(f.tracer, sun, place), 1);
+    end(&f);
+}
+
 static void a_sliver_of_sky_is_not_lost(void **state)
 {
     (void)state;
@@ -441,6 +462,7 @@ int main(void)
         cmocka_unit_test(cells_of_the_sky_are_equal_parts),
         cmocka_unit_test(paths_take_no_samples_of_a_uniform_sky),
         cmocka_unit_test(a_sliver_of_sky_is_not_lost),
+        cmocka_unit_test(places_beside_a_lamp_deserve_more_samples),
         cmocka_unit_test(source_below_the_horizon_gives_nothing_without_a_ray),
         cmocka_unit_test(rays_are_spared_where_neighbours_agree),
         cmocka_unit_test(bounds_of_the_tile_change_nothing),
