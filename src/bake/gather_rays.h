@@ -19,7 +19,7 @@ typedef struct lx_gather_luxel {
     float texel_m;    ///< Its edge.
     float reach;      ///< How far from the centre a source is near: light of such ones is in no row of direct light, for it differs too much over the luxel.
     uint64_t near_sources; ///< Bit s modulo 64: source s may be near.
-    bool is_beside_lamps;  ///< Some source has an lx_source_effort above 1 at the centre.
+    bool is_beside_lamps;  ///< Some near source has an lx_source_effort above 1 at the centre.
 } lx_gather_luxel;
 
 /// Is a source so near the luxel that its light differs too much over it? Never of one that is everywhere.

@@ -41,6 +41,7 @@ static size_t make_starts(const lx_gather_job *g, lx_gather_scratch *s, uint32_t
 
 // Inside a lantern or on the wall behind a sconce a few rays meet what the lamp lights from a few centimetres away, and hold most of a picture's error. There the layers of such
 // lamps have more rays of their own (lx_source_effort); other layers take no part in them, so that they do not change when lamps come and go.
+enum { most_effort = 16 };
 
 // Finds how many times the usual rays each layer has at the luxel: as many as the lamp of its own that asks for most. False: none has more.
 static bool find_efforts(const lx_gather_job *g, uint32_t luxel, uint8_t *efforts)
@@ -49,8 +50,9 @@ static bool find_efforts(const lx_gather_job *g, uint32_t luxel, uint8_t *effort
     memset(efforts, 1, g->layer_count * sizeof *efforts);
     for (uint32_t s = 0; s < g->bake->source_count; ++s) {
         const lx_source_use *use = &g->uses[s];
-        if (use->layer < 0) continue;
-        const uint32_t effort = lx_source_effort(g->bake->tracer, s, g->luxels[luxel].centre), layers = lx_source_use_layers(use, g->bake->tracer, s);
+        if (use->layer < 0 || !lx_gather_is_near(g->bake->tracer, &g->luxels[luxel], s)) continue; // farther away neighbours know as much
+        const uint32_t wanted = lx_source_effort(g->bake->tracer, s, g->luxels[luxel].centre), effort = wanted < most_effort ? wanted : most_effort;
+        const uint32_t layers = lx_source_use_layers(use, g->bake->tracer, s);
         for (uint32_t l = (uint32_t)use->layer; l < (uint32_t)use->layer + layers; ++l)
             if (efforts[l] < effort) efforts[l] = (uint8_t)effort;
     }
@@ -96,7 +98,7 @@ static lx_result trace_more(const lx_gather_job *g, lx_gather_scratch *s, const 
 static lx_result trace_beside(const lx_gather_job *g, lx_gather_scratch *s, const lx_gather_settings *settings, uint32_t first, uint32_t index, lx_error *error)
 {
     if (!find_efforts(g, s->luxel[index], s->efforts)) return LX_OK;
-    for (uint32_t effort = 2; effort <= lx_source_most_effort; effort *= 2) {
+    for (uint32_t effort = 4; effort <= most_effort; effort *= 4) {
         if (!memchr(s->efforts, (int)effort, g->layer_count)) continue;
         const lx_result result = trace_more(g, s, settings, effort, first, index, error);
         if (result != LX_OK) return result;
