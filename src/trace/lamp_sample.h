@@ -25,7 +25,7 @@ lx_lamp lx_lamp_of(const lx_light *light);
 LX_INLINED float lx_receiver_cosine(const lx_receiver *r, lx_vec3 direction)
 {
     const float cosine = lx_dot(r->normal, direction), upright = lx_dot(r->geometric_normal, direction);
-    return (cosine > 0) & (upright > 0) ? cosine : 0;
+    return ((cosine > 0) & (upright > 0)) ? cosine : 0;
 }
 
 /// Smooth cut-off at a light's range (KHR_lights_punctual): clamp(1 - (d / range)^4, 0, 1); range 0: 1.

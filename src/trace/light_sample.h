@@ -46,7 +46,7 @@ float lx_sky_weight(const lx_tracer *tracer, lx_vec3 direction, float cosine);
 LX_INLINED float lx_power_heuristic(float pdf_a, float pdf_b)
 {
     const float a = pdf_a * pdf_a, b = pdf_b * pdf_b;
-    return (a + b > 0) & (a < INFINITY) ? a / (a + b) : 1;
+    return ((a + b > 0) & (a < INFINITY)) ? a / (a + b) : 1;
 }
 
 #endif

@@ -44,9 +44,10 @@ LX_INLINED void find_reached(lx_source_view *v, const lx_source_sphere *s)
         const lx_receiver r = receiver_at(v, k);
         const lx_vec3 to_centre = lx_sub((lx_vec3){centre_x, centre_y, centre_z}, r.position);
         const float distance = lx_length(to_centre), facing = -lx_dot(axis, to_centre);
-        const bool above = (lx_dot(to_centre, r.normal) > -radius) & (lx_dot(to_centre, r.geometric_normal) > -radius);
+        const float along = lx_dot(to_centre, r.normal), upright = lx_dot(to_centre, r.geometric_normal);
+        const bool above = (along > -radius) & (upright > -radius);
         const bool turned = (distance >= range) | (facing < cos_outer * distance) | !(facing > least);
-        v->reached[k] = above & ((distance <= radius) | !turned) ? 1 : 0;
+        v->reached[k] = (above & ((distance <= radius) | !turned)) ? 1 : 0;
     }
 }
 
@@ -63,8 +64,8 @@ LX_INLINED void find_lit(lx_source_view *v, const lx_emitter_triangle *triangles
             const lx_vec3 a = lx_sub(corner[0], r.position), b = lx_sub(corner[1], r.position), c = lx_sub(corner[2], r.position);
             const float slack = 1e-5f * (lx_max_abs(r.position) + lx_max_abs(a));
             const float along = lx_max(lx_dot(a, r.normal), lx_max(lx_dot(b, r.normal), lx_dot(c, r.normal)));
-            const float upright = lx_max(lx_dot(a, r.geometric_normal), lx_max(lx_dot(b, r.geometric_normal), lx_dot(c, r.geometric_normal)));
-            lit[k] |= (both | (-lx_dot(facing, a) > -slack)) & (along > -slack) & (upright > -slack) ? 1 : 0;
+            const float upright = lx_max(lx_dot(a, r.geometric_normal), lx_max(lx_dot(b, r.geometric_normal), lx_dot(c, r.geometric_normal))), turned = lx_dot(facing, a);
+            lit[k] |= ((both | (turned < slack)) & (along > -slack) & (upright > -slack)) ? 1 : 0;
         }
     }
     for (int k = 0; k < size; ++k) v->reached[k] &= lit[k];
