@@ -417,14 +417,14 @@ static flight first_flight(const lx_gather_start *start, float cosine)
 
 static void fetch_luxel(const lx_gather_settings *settings, uint32_t luxel)
 {
-    if (luxel != LX_NO_LUXEL && settings->rows_direct) __builtin_prefetch(&settings->luxels[luxel & ~LX_SILENT]);
+    if (luxel != LX_NO_LUXEL && settings->rows_direct) LX_PREFETCH(&settings->luxels[luxel & ~LX_SILENT]);
 }
 
 static void fetch_triangle(const lx_lookup *lookup, const lx_hit *hit)
 {
     if (hit->surface == LX_MISS) return;
     const lx_lookup_triangle *triangles = lookup->surfaces[hit->surface].triangles;
-    if (triangles) __builtin_prefetch(triangles + hit->triangle);
+    if (triangles) LX_PREFETCH(triangles + hit->triangle);
 }
 
 // What is done with hits first … end - 1 of the first rays: `b->found` tells the start of each. Adds to the luxels that were found (at or before the hits in b->found).

@@ -3,6 +3,7 @@
 #define LX_BAKE_LOOKUP_H
 
 #include "bake/bake.h"
+#include "base/memory.h"
 #include "post/luxel_map.h"
 
 /// A triangle's lightmap coordinates in its mesh's unit square. Two of them fill a cache line.
@@ -72,13 +73,8 @@ static inline uint32_t lx_lookup_luxel(const lx_lookup *lookup, lx_taps taps)
 
 static inline void lx_lookup_fetch(const lx_lookup *lookup, lx_taps taps)
 {
-#if defined(__GNUC__)
-    __builtin_prefetch(&lookup->places[taps.tap]);
-    __builtin_prefetch(&lookup->places[taps.holder]);
-#else
-    (void)lookup;
-    (void)taps;
-#endif
+    LX_PREFETCH(&lookup->places[taps.tap]);
+    LX_PREFETCH(&lookup->places[taps.holder]);
 }
 
 /// Luxels whose `answers` is false fall silent.

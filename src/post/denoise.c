@@ -68,7 +68,6 @@ typedef struct work {
     const lx_denoise_knots *knots; // NULL: every luxel is one
     lx_light_part part;
     uint32_t candidate_count;
-    bool may_sharpen;            // weights below zero: kernels that keep curvature
     lx_rgb *candidates[most_candidates]; // [luxel]
     float *variances;            // [luxel]
     int mix_levels;              // over which products of differences are pooled
@@ -95,7 +94,7 @@ size_t lx_denoise_scratch_bytes(const lx_denoise_graph *graph)
 
 static work lay_out(const lx_denoise_graph *graph, lx_light_part part, const lx_denoise_knots *knots, void *scratch)
 {
-    work w = {.graph = graph, .knots = knots, .part = part, .candidate_count = part == lx_light_direct ? most_candidates : level_count, .may_sharpen = part == lx_light_indirect, .mix_levels = pool_levels};
+    work w = {.graph = graph, .knots = knots, .part = part, .candidate_count = part == lx_light_direct ? most_candidates : level_count, .mix_levels = pool_levels};
     const size_t count = graph->luxel_count;
     w.region = scratch;
     lx_rgb *next = (lx_rgb *)(void *)(w.region + 1);
@@ -234,37 +233,30 @@ static inline __attribute__((always_inline)) void filter_level(const work *w, sh
     }
 }
 
-static void filter_input(const work *w, const lx_rgb *input)
-{
-    for (int k = 0; k < (int)w->candidate_count; ++k) {
-        const shape s = shape_of(w->part, k);
-        filter_level(w, s, 3, 3, s.before < 0 ? &input->r : &w->candidates[s.before]->r, &w->candidates[k]->r);
-    }
-}
-
-static void filter_pilot(const work *w, int first, int end)
+// Candidates first … end - 1 of the input.
+static void filter_input(const work *w, const lx_estimate *in, int first, int end)
 {
     for (int k = first; k < end; ++k) {
-        const shape s = shape_of(w->part, k);
-        filter_level(w, s, 1, 1, s.before < 0 ? w->pilot : w->filtered[s.before], w->filtered[k]);
-    }
-}
-
-static void take_pilot(work *w, const lx_rgb *pilot, const lx_estimate *in)
-{
-    for (uint32_t i = 0; i < w->graph->luxel_count; ++i) w->pilot[i] = mean_of(pilot[i]);
-    w->has_pilot = true;
-    filter_pilot(w, 0, (int)w->candidate_count);
-    if (w->part == lx_light_direct) return;
-    w->candidate_count = 2 * level_count;
-    filter_pilot(w, level_count, 2 * level_count);
-    for (int k = level_count; k < 2 * level_count; ++k) {
         const shape s = shape_of(w->part, k);
         if (s.before < 0)
             filter_level(w, s, 3, sizeof *in / sizeof(float), &in->mean.r, &w->candidates[k]->r);
         else
             filter_level(w, s, 3, 3, &w->candidates[s.before]->r, &w->candidates[k]->r);
     }
+}
+
+// From now on there is a pilot, and candidates that it guides.
+static void take_pilot(work *w, const lx_rgb *pilot, const lx_estimate *in)
+{
+    const int before = (int)w->candidate_count;
+    for (uint32_t i = 0; i < w->graph->luxel_count; ++i) w->pilot[i] = mean_of(pilot[i]);
+    w->has_pilot = true;
+    if (w->part == lx_light_indirect) w->candidate_count = 2 * level_count;
+    for (int k = 0; k < (int)w->candidate_count; ++k) {
+        const shape s = shape_of(w->part, k);
+        filter_level(w, s, 1, 1, s.before < 0 ? w->pilot : w->filtered[s.before], w->filtered[k]);
+    }
+    filter_input(w, in, before, (int)w->candidate_count);
 }
 
 // Kernels are products of one along each axis, of [1 2 1] / 4 at the steps of all levels up to theirs. What a kernel has of a knot is what it has of the luxels around, each as far
@@ -478,6 +470,7 @@ static void find_weights(const work *w, const float *products, const unit_noise 
         x[k] = 0;
         if (own[k] < 1) used[used_count++] = k;
     }
+    const bool may_sharpen = w->part == lx_light_indirect; // weights below zero: kernels that keep curvature
     while (used_count > 0) {
         float a[most_candidates][most_candidates], y[most_candidates], whole[most_candidates]; // how much of a kernel's noise is left where neighbours are missing
         for (uint32_t i = 0; i < used_count; ++i) {
@@ -492,13 +485,13 @@ static void find_weights(const work *w, const float *products, const unit_noise 
         float sum = 0;
         for (uint32_t i = 0; i < used_count; ++i) {
             sum += y[i];
-            if (w->may_sharpen || y[i] >= 0) used[kept++] = used[i];
+            if (may_sharpen || y[i] >= 0) used[kept++] = used[i];
         }
         if (kept < used_count) {
             used_count = kept;
             continue;
         }
-        const float most = w->may_sharpen || sum <= 1 ? 1 : 1 / sum;
+        const float most = may_sharpen || sum <= 1 ? 1 : 1 / sum;
         for (uint32_t i = 0; i < used_count; ++i) x[used[i]] = y[i] * most;
         return;
     }
@@ -574,7 +567,7 @@ void lx_denoise_layer(const lx_denoise_graph *graph, lx_light_part part, const l
     work w = lay_out(graph, part, knots, scratch);
     find_unit_noise(&w);
     pool_variances(&w, in);
-    filter_input(&w, out);
+    filter_input(&w, in, 0, (int)w.candidate_count);
     calm_variances(&w, out);
     mix_all(&w, in, out);
     take_pilot(&w, out, in);

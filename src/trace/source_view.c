@@ -5,6 +5,8 @@
 #include "trace/light_sample.h"
 #include "trace/tracer_data.h"
 
+#include <string.h>
+
 enum { size = lx_view_size, few_triangles = 16 };
 
 LX_INLINED lx_vec3 vector_at(const lx_view_vectors *v, int k)
