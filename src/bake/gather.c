@@ -37,7 +37,7 @@ static void choose_scales(lx_gather_job *g)
         if (use->layer < 0) continue;
         const uint32_t layers = lx_source_use_layers(use, g->bake->tracer, s);
         for (uint32_t l = 0; l < layers; ++l)
-            g->scales[(uint32_t)use->layer + l] += lx_rgb_max(use->weight) * g->bake->tracer->source_scales[s] * 20;
+            g->scales[(uint32_t)use->layer + l] += lx_rgb_max(use->weight) * lx_source_mean(g->bake->tracer, s);
     }
     for (uint32_t l = 0; l < g->row_layers; ++l) {
         int exponent;

@@ -699,7 +699,7 @@ bool lx_direct_light(lx_direct_batch *b, const lx_direct_settings *settings, con
     j.is_beside = may_be_beside(&j);
     j.viewed = most_luxels;
     j.noise = settings->noise;
-    j.least = darkest * 20 * tracer->source_scales[source]; // which are a twentieth of the mean
+    j.least = darkest * lx_source_mean(tracer, source);
     // A monitor's cells must each be sure; and without a bound nothing ends early.
     if (j.cells == 1 && j.noise > 0) j.first_samples = first_step(j.first_samples);
     memset(b->luxels, 0, tile->count * sizeof *b->luxels);

@@ -103,7 +103,7 @@ uint32_t lx_source_effort(const lx_tracer *tracer, uint32_t source, lx_vec3 plac
 {
     static const float least_brightness = 256; // unshadowed light over the mean of all surfaces
     const lx_source_sphere *s = &tracer->source_spheres[source];
-    const float mean = 20 * tracer->source_scales[source]; // which are a twentieth of it
+    const float mean = lx_source_mean(tracer, source);
     if (!(s->power < INFINITY) || !(mean > 0)) return 1;
     const lx_vec3 d = lx_sub(s->centre, place);
     const float squared = lx_dot(d, d) + s->radius * s->radius; // a bulb among many in one source is no small lamp

@@ -52,6 +52,12 @@ struct lx_tracer {
     uint32_t source_count;
 };
 
+/// Mean unshadowed irradiance that a source of strength 1 gives the scene's surfaces.
+static inline float lx_source_mean(const lx_tracer *tracer, uint32_t source)
+{
+    return 20 * tracer->source_scales[source]; // see build_scales
+}
+
 /// True if the surface belongs to a monitor whose light is told by cell.
 static inline bool lx_surface_is_told_by_cell(const lx_tracer *tracer, uint32_t surface)
 {
