@@ -63,10 +63,9 @@ static lx_result create_scratch(lx_gather_job *g, uint32_t workers, uint32_t rou
         s->near_light = lx_malloc_array(lx_gather_tile_luxels, g->stride * sizeof *s->near_light);
         s->mean = lx_malloc_array(cells * lx_gather_tile_luxels, sizeof *s->mean);
         s->variance = lx_malloc_array(cells * lx_gather_tile_luxels, sizeof *s->variance);
-        s->efforts = lx_malloc_array(g->layer_count, sizeof *s->efforts);
         s->found = lx_malloc_array((size_t)lx_gather_chunk_luxels * lx_gather_most_pass_rays, sizeof *s->found);
         s->distances = lx_malloc_array((size_t)lx_gather_chunk_luxels * lx_gather_most_pass_rays, sizeof *s->distances);
-        if (!s->batch || !s->direct || !s->sites || !s->starts || !s->sums || !s->met || !s->near_light || !s->mean || !s->variance || !s->efforts || !s->found ||
+        if (!s->batch || !s->direct || !s->sites || !s->starts || !s->sums || !s->met || !s->near_light || !s->mean || !s->variance || !s->found ||
             !s->distances)
             return lx_fail_memory(error, "workers");
     }
@@ -82,7 +81,7 @@ static void release_cache(lx_gather_job *g, uint32_t workers)
         if (s->direct) g->job->ray_count += lx_direct_batch_rays(s->direct);
         lx_gather_batch_destroy(s->batch);
         lx_direct_batch_destroy(s->direct);
-        void *arrays[] = {s->sites, s->starts, s->sums, s->met, s->near_light, s->mean, s->variance, s->efforts, s->found, s->distances};
+        void *arrays[] = {s->sites, s->starts, s->sums, s->met, s->near_light, s->mean, s->variance, s->found, s->distances};
         for (size_t k = 0; k < sizeof arrays / sizeof *arrays; ++k) lx_free(arrays[k]);
     }
     for (uint32_t t = 0; g->extras && t < g->job->map.tile_count; ++t) lx_free(g->extras[t].items);
@@ -246,7 +245,7 @@ static lx_result bake_group(lx_bake_job *job, uint32_t first, uint32_t count, lx
     lx_result result = LX_OK;
     lx_bake *bake = job->bake;
     lx_pool *pool = bake->scene->context->pool;
-    const uint32_t workers = lx_pool_worker_count(pool), samples = bake->desc.samples;
+    const uint32_t workers = lx_pool_worker_count(pool), rays = lx_gather_rays(bake->desc.samples);
     const uint32_t bounces = bake->desc.direct_only ? 0 : bake->desc.transport.bounces;
     double stage_start = lx_seconds();
     for (uint32_t s = 0; s < bake->source_count; ++s) {
@@ -255,7 +254,7 @@ static lx_result bake_group(lx_bake_job *job, uint32_t first, uint32_t count, lx
         uses[s].layer = in_group ? uses[s].layer - (int32_t)first : -1;
     }
     lx_gather_job g = {.job = job, .bake = bake, .uses = uses, .first_layer = first, .layer_count = count, .row_layers = lx_row_layers(count), .sums = sums,
-                    .luxel_count = job->map.view.count, .pass_rays = lx_gather_pass_rays(samples)};
+                    .luxel_count = job->map.view.count, .pass_rays = lx_gather_pass_rays(rays)};
     g.stride = 3 * (size_t)g.row_layers;
     g.row_stride = lx_row_stride(g.row_layers);
     g.settings.bounces = bounces;
@@ -267,7 +266,7 @@ static lx_result bake_group(lx_bake_job *job, uint32_t first, uint32_t count, lx
     choose_scales(&g);
     LX_TRY(lx_lookup_create(bake, &job->map.view, &g.lookup, error));
     LX_TRY(choose_answers(&g, error));
-    LX_TRY(create_scratch(&g, workers, samples < lx_gather_largest_round ? samples : lx_gather_largest_round, error));
+    LX_TRY(create_scratch(&g, workers, rays < lx_gather_largest_round ? rays : lx_gather_largest_round, error));
     LX_TRY(lx_gather_light(&g, error));
     job->stages.direct += lx_lap(&stage_start);
     if (bounces > 0) {

@@ -51,7 +51,6 @@ static lx_gather_luxel describe(const lx_gather_job *g, lx_texel *t, uint32_t lu
     for (uint32_t s = 0; s < g->bake->source_count; ++s) {
         if (g->uses[s].layer < 0 || !lx_gather_is_near(g->bake->tracer, &out, s)) continue;
         out.near_sources |= (uint64_t)1 << s % 64;
-        out.is_beside_lamps |= lx_source_effort(g->bake->tracer, s, out.centre) > 1;
     }
     return out;
 }

@@ -25,7 +25,7 @@ typedef struct lx_gather_scratch {
     lx_gather_start *starts; // [lx_gather_chunk_luxels × rays of a round at most]
     float *sums;            // [2][lx_gather_chunk_luxels][3][row_layers], or [lx_gather_tile_luxels][3][row_layers]
     float *met;             // the same, of what rays meet of light sources
-    float *near_light;      // [lx_gather_tile_luxels][3][row_layers] of sources near the luxel; later rows of a luxel beside a lamp
+    float *near_light;      // [lx_gather_tile_luxels][3][row_layers] of sources near the luxel
     lx_rgb *mean;           // [cells][lx_gather_tile_luxels] of one source
     float *variance;
     uint32_t *found;        // [lx_gather_chunk_luxels][lx_gather_most_pass_rays]
@@ -33,7 +33,6 @@ typedef struct lx_gather_scratch {
     uint32_t stream[lx_gather_tile_luxels], chart[lx_gather_tile_luxels];
     uint16_t place[lx_gather_tile_luxels];
     uint32_t luxel[lx_gather_tile_luxels]; // of the map
-    uint8_t *efforts;            // [layer_count] at the luxel at work
     uint8_t alone[lx_gather_tile_luxels];  // it sends no gather rays
     uint64_t sky_seen[lx_gather_tile_luxels], sky_through[lx_gather_tile_luxels]; // cells in which the cache's rays met a uniform sky, and through a pane
     lx_sky_cells sky_cells[lx_gather_tile_luxels]; // of luxels of the tile, later of targets

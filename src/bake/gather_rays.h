@@ -19,7 +19,6 @@ typedef struct lx_gather_luxel {
     float texel_m;    ///< Its edge.
     float reach;      ///< How far from the centre a source is near: light of such ones is in no row of direct light, for it differs too much over the luxel.
     uint64_t near_sources; ///< Bit s modulo 64: source s may be near.
-    bool is_beside_lamps;  ///< Some near source has an lx_source_effort above 1 at the centre.
 } lx_gather_luxel;
 
 /// Is a source so near the luxel that its light differs too much over it? Never of one that is everywhere.
@@ -75,10 +74,16 @@ typedef struct lx_gather_output {
 
 enum { lx_gather_batch_size = 4096 };
 
-/// Rays of a luxel for the cache's passes, where `samples` gather. What they have of noise all luxels share that look it up, and no filter can tell; passes themselves cost next to nothing.
-static inline uint32_t lx_gather_pass_rays(uint32_t samples)
+/// Gather rays of a luxel, where `samples` look at each light source: they serve all sources at once and cost little, yet hold most of the noise.
+static inline uint32_t lx_gather_rays(uint32_t samples)
 {
-    return samples < 128 ? 16 : samples < 256 ? 32 : 64;
+    return 4 * samples;
+}
+
+/// Rays of a luxel for the cache's passes, beside so many gather rays. What they have of noise all luxels share that look it up, and no filter can tell; passes themselves cost next to nothing.
+static inline uint32_t lx_gather_pass_rays(uint32_t rays)
+{
+    return rays < 128 ? 16 : rays < 256 ? 32 : 64;
 }
 
 /// Working memory of one worker.

@@ -37,75 +37,6 @@ static size_t make_starts(const lx_gather_job *g, lx_gather_scratch *s, uint32_t
     return count;
 }
 
-// ---- beside lamps -------------------------------------------------------------------------------------------------------------
-
-// Inside a lantern or on the wall behind a sconce a few rays meet what the lamp lights from a few centimetres away, and hold most of a picture's error. There the layers of such
-// lamps have more rays of their own (lx_source_effort); other layers take no part in them, so that they do not change when lamps come and go.
-enum { most_effort = 16 };
-
-// Finds how many times the usual rays each layer has at the luxel: as many as the lamp of its own that asks for most. False: none has more.
-static bool find_efforts(const lx_gather_job *g, uint32_t luxel, uint8_t *efforts)
-{
-    if (g->settings.bounces == 0 || !g->luxels[luxel].is_beside_lamps) return false;
-    memset(efforts, 1, g->layer_count * sizeof *efforts);
-    for (uint32_t s = 0; s < g->bake->source_count; ++s) {
-        const lx_source_use *use = &g->uses[s];
-        if (use->layer < 0 || !lx_gather_is_near(g->bake->tracer, &g->luxels[luxel], s)) continue; // farther away neighbours know as much
-        const uint32_t wanted = lx_source_effort(g->bake->tracer, s, g->luxels[luxel].centre), effort = wanted < most_effort ? wanted : most_effort;
-        const uint32_t layers = lx_source_use_layers(use, g->bake->tracer, s);
-        for (uint32_t l = (uint32_t)use->layer; l < (uint32_t)use->layer + layers; ++l)
-            if (efforts[l] < effort) efforts[l] = (uint8_t)effort;
-    }
-    return true;
-}
-
-// Sums of the layers that have `effort` become what all rays together would have brought to the round's own.
-static void take_beside(const lx_gather_job *g, const uint8_t *efforts, uint32_t effort, const float *more, float *sums)
-{
-    for (uint32_t l = 0; l < g->layer_count; ++l)
-        for (uint32_t c = 0; c < 3 && efforts[l] == effort; ++c) {
-            const size_t at = (size_t)c * g->row_layers + l;
-            sums[at] = (sums[at] + more[at]) / (float)effort;
-        }
-}
-
-// Further rays of luxel `index` of the list, row `index` - `first` of the sums, for the layers that have `effort` there.
-static lx_result trace_more(const lx_gather_job *g, lx_gather_scratch *s, const lx_gather_settings *settings, uint32_t effort, uint32_t first, uint32_t index, lx_error *error)
-{
-    const uint32_t n = g->round_count, half = (n + 1) / 2, more = effort - 1;
-    float *sums = s->near_light, *met = s->near_light + 2 * g->stride; // of this luxel alone
-    memset(sums, 0, 4 * g->stride * sizeof *sums);
-    lx_receiver sites[lx_site_count];
-    lx_gather_place_sites(g, s, index, 0, lx_site_count, sites);
-    lx_gather_settings own = *settings;
-    lx_sky_cells sky_cells[2] = {{0, 0}, {0, 0}};
-    if (g->samples_sky) sky_cells[0] = sky_cells[1] = g->sky_cells[s->luxel[index]];
-    own.sky_cells = g->samples_sky ? sky_cells : NULL;
-    size_t count = 0;
-    for (uint32_t k = 0; k < n * more; ++k)
-        s->starts[count++] = (lx_gather_start){.receiver = &sites[k / rays_per_site % lx_site_count], .stream = lx_hash_combine(s->stream[index], effort),
-                                               .sample = g->round_first * more + k, .target = k < half * more ? 0 : 1};
-    const lx_gather_output out = {.sums = sums, .met = g->met_estimates ? met : NULL};
-    const lx_result result = lx_gather_trace(s->batch, &own, s->starts, count, &out, error);
-    for (uint32_t h = 0; h < 2 && result == LX_OK; ++h) {
-        const size_t row = g->stride * (index - first + h * lx_gather_chunk_luxels);
-        take_beside(g, s->efforts, effort, sums + h * g->stride, s->sums + row);
-        if (g->met_estimates) take_beside(g, s->efforts, effort, met + h * g->stride, s->met + row);
-    }
-    return result;
-}
-
-static lx_result trace_beside(const lx_gather_job *g, lx_gather_scratch *s, const lx_gather_settings *settings, uint32_t first, uint32_t index, lx_error *error)
-{
-    if (!find_efforts(g, s->luxel[index], s->efforts)) return LX_OK;
-    for (uint32_t effort = 4; effort <= most_effort; effort *= 4) {
-        if (!memchr(s->efforts, (int)effort, g->layer_count)) continue;
-        const lx_result result = trace_more(g, s, settings, effort, first, index, error);
-        if (result != LX_OK) return result;
-    }
-    return LX_OK;
-}
-
 // ---- rounds ---------------------------------------------------------------------------------------------------------------------
 
 // How a round's sums of one layer, of its halves, become a part of an estimate.
@@ -212,8 +143,7 @@ static lx_result gather_tile(void *user, size_t task, uint32_t worker, lx_error 
         const size_t count = make_starts(g, s, first, end);
         if (g->met_estimates) memset(s->met, 0, 2 * lx_gather_chunk_luxels * g->stride * sizeof *s->met);
         const lx_gather_output out = {.sums = s->sums, .met = g->met_estimates ? s->met : NULL};
-        lx_result result = lx_gather_trace(s->batch, &settings, s->starts, count, &out, error);
-        for (uint32_t i = first; i < end && result == LX_OK; ++i) result = trace_beside(g, s, &settings, first, i, error);
+        const lx_result result = lx_gather_trace(s->batch, &settings, s->starts, count, &out, error);
         if (result != LX_OK) return result;
         fold(g, state, s, task, first, end);
     }
@@ -320,15 +250,16 @@ static lx_result run_rounds(lx_gather_job *g, double deadline, lx_error *error)
     lx_bake_job *job = g->job;
     lx_pool *pool = g->bake->scene->context->pool;
     const lx_bake_desc *desc = &g->bake->desc;
+    const uint32_t rays = lx_gather_rays(desc->samples);
     lx_stage_part part = {.sink = job->progress, .start = lx_seconds()};
     const lx_progress_sink sink = {lx_report_part, &part};
-    for (uint32_t done = 0; done < desc->samples;) {
+    for (uint32_t done = 0; done < rays;) {
         const uint32_t step = done == 0 ? first_round : done < lx_gather_largest_round ? done : lx_gather_largest_round; // cumulative counts are powers of two, for which Sobol points are best spread
         g->round_first = done;
-        g->round_count = step < desc->samples - done ? step : desc->samples - done;
+        g->round_count = step < rays - done ? step : rays - done;
         const double round_start = lx_seconds();
-        part.from = (double)done / desc->samples;
-        part.share = (double)g->round_count / desc->samples;
+        part.from = (double)done / rays;
+        part.share = (double)g->round_count / rays;
         LX_TRY(lx_pool_run_weighted(pool, job->map.tile_count, job->tile_weights, gather_tile, g, "gather", &sink, error));
         done += g->round_count;
         if (g->round_first == 0) find_layer_means(g);
