@@ -10,7 +10,7 @@
 
 #include "bake/lookup.h"
 #include "bake/rows.h"
-#include "trace/sky_cells.h"
+#include "trace/direct.h"
 
 /// What near hits take of a luxel beside its row of direct light.
 typedef struct lx_gather_luxel {
@@ -74,10 +74,10 @@ typedef struct lx_gather_output {
 
 enum { lx_gather_batch_size = 4096 };
 
-/// Gather rays of a luxel, where `samples` look at each light source: they serve all sources at once and cost little, yet hold most of the noise.
+/// Gather rays of a luxel, where `samples` look at each light source.
 static inline uint32_t lx_gather_rays(uint32_t samples)
 {
-    return 4 * samples;
+    return lx_rays_per_sample * samples;
 }
 
 /// Rays of a luxel for the cache's passes, beside so many gather rays. What they have of noise all luxels share that look it up, and no filter can tell; passes themselves cost next to nothing.

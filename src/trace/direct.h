@@ -34,6 +34,9 @@ typedef struct lx_direct_tile {
 
 void lx_direct_find_bounds(const lx_direct_tile *tile, lx_direct_bounds *out);
 
+/// Cosine-weighted rays that leave a luxel for each sample: they serve all sources at once and cost little, yet hold most of the noise.
+enum { lx_rays_per_sample = 4 };
+
 typedef struct lx_direct_settings {
     const lx_tracer *tracer;
     uint32_t samples;           ///< At most so many shadow rays a luxel and source (times lx_direct_sample_weight), a multiple of lx_direct_sites.
@@ -55,6 +58,7 @@ bool lx_direct_light(lx_direct_batch *batch, const lx_direct_settings *settings,
                      float *variance);
 
 /// The `count` that weighs samples of a source against one cosine-weighted ray: 1 but for monitors. A matter of the source alone.
+/// There are more rays than that; but samples are spread over the source alone, so they err by less than their number says.
 uint32_t lx_direct_sample_weight(const lx_tracer *tracer, uint32_t source);
 
 #endif

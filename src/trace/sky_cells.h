@@ -19,19 +19,19 @@ typedef struct lx_sky_cells {
 } lx_sky_cells;
 
 /// So many samples a cell has for each gather ray there.
-static inline uint32_t lx_sky_cell_weight(const lx_sky_cells *cells, uint32_t cell)
+static inline float lx_sky_per_ray(const lx_sky_cells *cells, uint32_t cell)
 {
-    enum { weight = 8, weight_beside = 2 };
-    return cells->mixed >> cell & 1 ? weight : cells->beside >> cell & 1 ? weight_beside : 0;
+    static const float mixed = 2, beside = 0.5f;
+    return cells->mixed >> cell & 1 ? mixed : cells->beside >> cell & 1 ? beside : 0;
 }
 
-/// What of a cell's light `weight` samples for each gather ray bring; these bring the rest.
+/// What of a cell's light `per_ray` samples for each gather ray bring; rays bring the rest.
 ///
 /// Looks of either kind would count alike; but a ray that misses the sky meets what shines a little like it, and the errors of both cancel in part. That is lost with what
 /// samples bring, and they get so much less.
-static inline float lx_sky_samples_share(uint32_t weight)
+static inline float lx_sky_samples_share(float per_ray)
 {
-    return 0.9f * (float)weight / (float)(weight + 1);
+    return 0.9f * per_ray / (per_ray + 1);
 }
 
 /// `count` cells, a power of two up to lx_sky_most_cells, are rings of u.x, the square of the sine of the angle to the normal, times sectors of u.y, which goes around it.

@@ -90,7 +90,7 @@ static uint32_t source_number(const fixture *f, const char *name)
 // One cosine-weighted look at a uniform sky: samples have their share of it, gather rays the rest.
 static lx_ray look_at_sky(const fixture *f, uint32_t luxel, const lx_receiver *site, lx_vec2 u, float *light)
 {
-    *light = LX_PI * lx_sky_samples_share(lx_sky_cell_weight(&f->sky_cells[luxel], lx_sky_cell_of(u, sky_cell_count)));
+    *light = LX_PI * lx_sky_samples_share(lx_sky_per_ray(&f->sky_cells[luxel], lx_sky_cell_of(u, sky_cell_count)));
     return (lx_ray){.origin = lx_offset_origin(site->position, site->geometric_normal), .direction = lx_to_world(site->normal, lx_sample_polar_hemisphere(u)), .t_max = INFINITY};
 }
 
@@ -192,8 +192,8 @@ static void samples_and_rays_share_all_light_of_a_uniform_sky(void **state)
     for (uint32_t i = 0; i < luxels; ++i) {
         alone[i] = i % 2;
         for (uint32_t k = 0; k < sky_cell_count; ++k) {
-            const uint32_t weight = lx_sky_cell_weight(&f.sky_cells[i], k);
-            wanted += samples / sky_cell_count * (alone[i] && weight == 0 ? 1 : weight);
+            const float per_ray = lx_sky_per_ray(&f.sky_cells[i], k);
+            wanted += samples / sky_cell_count * (uint32_t)(alone[i] && per_ray == 0 ? 1 : lx_rays_per_sample * per_ray);
         }
     }
     f.tile.alone = alone;
@@ -203,7 +203,7 @@ static void samples_and_rays_share_all_light_of_a_uniform_sky(void **state)
     assert_true(lx_direct_light(f.batch, &settings, &f.tile, source, mean, variance));
     for (uint32_t i = 0; i < luxels; ++i) {
         float rays_bring = 0;
-        for (uint32_t k = 0; k < sky_cell_count && !alone[i]; ++k) rays_bring += (1 - lx_sky_samples_share(lx_sky_cell_weight(&f.sky_cells[i], k))) / sky_cell_count;
+        for (uint32_t k = 0; k < sky_cell_count && !alone[i]; ++k) rays_bring += (1 - lx_sky_samples_share(lx_sky_per_ray(&f.sky_cells[i], k))) / sky_cell_count;
         assert_near((double)(mean[i].g + rays_bring * LX_PI), (double)LX_PI, 3e-5);
         assert_true(variance[i] < 1e-9f);
     }
