@@ -254,7 +254,8 @@ static lx_result bake_group(lx_bake_job *job, uint32_t first, uint32_t count, lx
         uses[s].layer = in_group ? uses[s].layer - (int32_t)first : -1;
     }
     lx_gather_job g = {.job = job, .bake = bake, .uses = uses, .first_layer = first, .layer_count = count, .row_layers = lx_row_layers(count), .sums = sums,
-                    .luxel_count = job->map.view.count, .pass_rays = lx_gather_pass_rays(rays)};
+                    .luxel_count = job->map.view.count, .pass_rays = lx_gather_pass_rays(rays, job->map.view.count)};
+    g.sky_cell_count = g.pass_rays < lx_sky_most_cells ? g.pass_rays : lx_sky_most_cells;
     g.stride = 3 * (size_t)g.row_layers;
     g.row_stride = lx_row_stride(g.row_layers);
     g.settings.bounces = bounces;

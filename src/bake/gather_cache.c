@@ -122,7 +122,7 @@ static float find_closeness(const float *distances, uint32_t count)
 static lx_result send_pass_rays(const lx_gather_job *g, lx_gather_scratch *s, size_t task, lx_error *error)
 {
     const lx_gather_settings settings = {.tracer = g->bake->tracer, .lookup = &g->lookup, .uses = g->uses, .scales = g->scales,
-                                         .row_layers = g->row_layers, .bounces = g->settings.bounces, .everything = true, .near_texels = pass_near_texels, .luxels = g->luxels, .sky_cell_count = g->pass_rays};
+                                         .row_layers = g->row_layers, .bounces = g->settings.bounces, .everything = true, .near_texels = pass_near_texels, .luxels = g->luxels, .sky_cell_count = g->sky_cell_count};
     lx_gather_extras *extras = &g->extras[task];
     for (uint32_t first = 0; first < s->count; first += lx_gather_chunk_luxels) {
         const uint32_t end = first + lx_gather_chunk_luxels < s->count ? first + lx_gather_chunk_luxels : s->count;
@@ -165,7 +165,7 @@ static void light_from_sources(const lx_gather_job *g, lx_gather_scratch *s)
     const lx_bake_desc *desc = &g->bake->desc;
     lx_direct_bounds bounds;
     lx_direct_tile direct = {.count = s->count, .place = s->place, .chart = s->chart, .stream = s->stream, .sites = s->sites, .alone = s->alone,
-                             .sky_cells = s->sky_cells, .sky_cell_count = g->pass_rays};
+                             .sky_cells = s->sky_cells, .sky_cell_count = g->sky_cell_count};
     lx_direct_find_bounds(&direct, &bounds);
     direct.bounds = &bounds;
     const lx_direct_settings settings = {.tracer = g->bake->tracer, .samples = (desc->samples + lx_direct_sites - 1) / lx_direct_sites * lx_direct_sites,

@@ -10,7 +10,6 @@
 enum {
     lx_gather_tile_luxels = lx_luxel_tile_edge * lx_luxel_tile_edge,
     lx_gather_chunk_luxels = 256,    ///< Of a tile, whose sums are at work at a time.
-    lx_gather_most_pass_rays = 64,
     lx_gather_largest_round = 256,   ///< Rays a luxel.
 };
 
@@ -69,7 +68,7 @@ typedef struct lx_gather_job {
     float *authored;        // [layer_count] mean channel of c
     lx_gather_luxel *luxels; // [luxel]
     float *closeness;       // [luxel] of what is around, 1 / m²; INFINITY: not to be interpolated
-    lx_sky_cells *sky_cells; // [luxel] where samples look for a uniform sky besides gather rays; as many cells as the cache has rays a luxel
+    lx_sky_cells *sky_cells; // [luxel] where samples look for a uniform sky besides gather rays; sky_cell_count of them
     uint8_t *spacing;       // [luxel] of the knots it is interpolated from; 0: it sends gather rays
     bool interpolates;
     bool samples_sky;       // it is of one colour
@@ -78,7 +77,7 @@ typedef struct lx_gather_job {
                             // in the end what gather rays read
     uint16_t *rows_direct;  // likewise, light straight from sources that are not near
     uint32_t pass;          // passes so far
-    uint32_t pass_rays;
+    uint32_t pass_rays, sky_cell_count;
     uint32_t *hits;         // [luxel][pass_rays]
     lx_gather_extras *extras; // [tile]; targets are luxels of the tile
     lx_estimate *direct, *indirect; // [layer][luxel]

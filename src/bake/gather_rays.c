@@ -160,8 +160,9 @@ static void add_sky(const lx_gather_settings *settings, const lx_gather_output *
     lx_rgb light = lx_rgb_scale(lx_rgb_mul(f->throughput, lx_sky_radiance(&tracer->sky, direction)), LX_PI * lx_sky_weight(tracer, direction, f->cosine));
     if (f->vertex == 0 && (settings->sky_cells || out->sky_seen)) {
         const uint32_t cell = lx_sky_cell_of(direction_point(f->stream, f->sample, 0), settings->sky_cell_count);
-        if (out->sky_seen) out->sky_seen[f->target] |= (uint64_t)1 << cell;
-        if (out->sky_seen && f->passes > 0) out->sky_through[f->target] |= (uint64_t)1 << cell;
+        const bool looks = out->sky_seen && f->sample < settings->sky_cell_count; // one ray a cell
+        if (looks) out->sky_seen[f->target] |= (uint64_t)1 << cell;
+        if (looks && f->passes > 0) out->sky_through[f->target] |= (uint64_t)1 << cell;
         if (settings->sky_cells) light = lx_rgb_scale(light, 1 - lx_sky_samples_share(lx_sky_per_ray(&settings->sky_cells[f->target], cell)));
     }
     add_light(settings, sums_for(out, f->vertex), f->target, use, 0, light);

@@ -63,7 +63,7 @@ typedef struct lx_gather_extras {
 typedef struct lx_gather_output {
     float *sums;             ///< [target][3][row_layers], added to.
     float *met;              ///< Likewise, what the first rays themselves meet of light sources. NULL: that goes to `sums` too.
-    uint64_t *sky_seen;      ///< [target] bit k: first rays met the sky in cell k of sky_cell_count. NULL: not wanted.
+    uint64_t *sky_seen;      ///< [target] bit k: the one of the first sky_cell_count rays that leaves in cell k met the sky. NULL: not wanted.
     uint64_t *sky_through;   ///< Likewise, through a pane.
     float *near_met;         ///< As `met`, of emissive sources that are near luxel `targets`[target]. NULL: that goes to `met`.
     const uint32_t *targets; ///< [target] its luxel, beside near_met.
@@ -80,10 +80,17 @@ static inline uint32_t lx_gather_rays(uint32_t samples)
     return lx_rays_per_sample * samples;
 }
 
-/// Rays of a luxel for the cache's passes, beside so many gather rays. What they have of noise all luxels share that look it up, and no filter can tell; passes themselves cost next to nothing.
-static inline uint32_t lx_gather_pass_rays(uint32_t rays)
+enum { lx_gather_most_pass_rays = 256 };
+
+/// Rays of a luxel for the cache's passes, beside so many gather rays: a power of two. What they have of noise all luxels share that look it up, and no filter can tell; in a
+/// scene of few luxels it does not average out either. Passes themselves cost next to nothing, but remember each ray's hit.
+static inline uint32_t lx_gather_pass_rays(uint32_t rays, uint32_t luxels)
 {
-    return rays < 128 ? 16 : rays < 256 ? 32 : 64;
+    enum { least = 16, usual = 64, enough = 1 << 24 }; // the last of all luxels together
+    uint32_t count = least;
+    while (count < usual && 4 * count <= rays) count *= 2;
+    while (count < lx_gather_most_pass_rays && 4 * count < rays && (uint64_t)count * luxels < enough) count *= 2;
+    return count;
 }
 
 /// Working memory of one worker.

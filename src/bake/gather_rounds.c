@@ -135,7 +135,7 @@ static lx_result gather_tile(void *user, size_t task, uint32_t worker, lx_error 
     const uint32_t chunk = lx_gather_chunk_luxels;
     lx_gather_settings settings = g->settings;
     settings.sky_cells = g->samples_sky ? s->sky_cells : NULL;
-    settings.sky_cell_count = g->pass_rays;
+    settings.sky_cell_count = g->sky_cell_count;
     for (uint32_t first = 0; first < s->count; first += chunk) {
         if (lx_pool_is_stopping(g->bake->scene->context->pool)) return LX_OK;
         const uint32_t end = first + chunk < s->count ? first + chunk : s->count;

@@ -48,5 +48,5 @@ void lx_gather_choose_sky_cells(const lx_gather_job *g, lx_gather_scratch *s)
     uint16_t grid[edge * edge]; // luxel + 1, 0: none
     memset(grid, 0, sizeof grid);
     for (uint32_t i = 0; i < s->count; ++i) grid[s->place[i]] = (uint16_t)(i + 1);
-    for (uint32_t i = 0; i < s->count; ++i) s->sky_cells[i] = g->sky_cells[s->luxel[i]] = choose(s, grid, i, g->pass_rays);
+    for (uint32_t i = 0; i < s->count; ++i) s->sky_cells[i] = g->sky_cells[s->luxel[i]] = choose(s, grid, i, g->sky_cell_count);
 }

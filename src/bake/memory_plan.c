@@ -93,7 +93,7 @@ static uint64_t group_bytes(const lx_bake_job *job, const lx_finish *finish, uin
     uint64_t cache = lookup_bytes(bake) + workers * (cost.batches + cost.worker_row * padded + (uint64_t)cost.worker_cell * largest_cell_count(bake));
     cache += luxels * cost.met * met;
     if (lx_sky_is_uniform(&bake->tracer->sky)) cache += luxels * cost.sky_cells;
-    if (bounces) cache += luxels * (cost.luxel + cost.pass_ray * lx_gather_pass_rays(lx_gather_rays(bake->desc.samples)) + cost.extra + (cost.rows + (truncated ? cost.pass_rows : 0)) * lx_row_stride((uint32_t)padded) * sizeof(uint16_t));
+    if (bounces) cache += luxels * (cost.luxel + cost.pass_ray * lx_gather_pass_rays(lx_gather_rays(bake->desc.samples), job->map.view.count) + cost.extra + (cost.rows + (truncated ? cost.pass_rows : 0)) * lx_row_stride((uint32_t)padded) * sizeof(uint16_t));
     const uint64_t finishing = lx_finish_worker_bytes(finish) * (layers < workers ? layers : workers); // the cache is gone by then
     return estimates + (cache > finishing ? cache : finishing);
 }

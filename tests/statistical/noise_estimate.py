@@ -19,7 +19,7 @@ def main():
     bakes.PROGRAM = os.path.abspath(sys.argv[1])
     failures = 0
     for name in sys.argv[2:] or ROOMS:
-        b = bakes.bakes_of_room(name, ["samples=%d" % n for n in SAMPLES] + ["samples=4096,salt=1,interpolation=0"], page_size=64, borders=1)
+        b = bakes.bakes_of_room(name, ["samples=%d" % n for n in SAMPLES] + ["samples=2048,salt=1,interpolation=0"], page_size=128, borders=1)
         for samples, bake in zip(SAMPLES, b.bakes):
             ratio = bake["off_by"] / bake["noise"]
             good = LEAST <= ratio <= MOST
