@@ -59,12 +59,13 @@ typedef struct view {
     uint32_t looks, backs;
 } view;
 
-// What is touched rather than seen does not count: in the corner of two walls it would hide what the place is inside of.
+// What is touched rather than seen does not count: in the corner of two walls it would hide what the place is inside of. Ends early where so many backs were seen that no
+// further look makes the place open.
 static void look_around(const company *c, const lx_receiver *r, uint32_t site, uint32_t first, uint32_t end, view *out)
 {
     const uint32_t stream = lx_hash_combine(c->stream, 0x51e30000u + site);
     const float touch = 0.01f * c->texel_m[site];
-    for (uint32_t i = first; i < end; ++i) {
+    for (uint32_t i = first; i < end && most_backs * out->backs <= all_looks; ++i) {
         const lx_ray ray = look(r, stream, i);
         lx_hit hit;
         lx_trace_closest(c->tracer, &ray, &hit, 1);
