@@ -41,7 +41,7 @@ typedef enum lx_denoiser {
 typedef struct lx_bake_desc {
     lx_transport_desc transport;
     lx_integrator integrator; ///< Default LX_INTEGRATOR_GATHER.
-    uint32_t samples;     ///< Gather rays or paths per texel at most, 1 … 16 M. Error falls with 1/sqrt(n). Default 256.
+    uint32_t samples;     ///< Per texel at most, 1 … 16 M: samples of each light source, with four gather rays for each; or paths. Error falls with 1/sqrt(n) or faster. Default 256.
     float noise;          ///< Gather: a tile of texels is done where each layer's standard error over max(texel, 1 % of the layer's mean), root mean
                           ///< square, is below it. 0: all samples are taken. Default 0.02.
     float interpolation;  ///< Gather: indirect light is interpolated between texels where that errs by at most this share of it, as distances of what is around

@@ -112,7 +112,7 @@ static int parse(const cli_command *command, int argc, char **argv, bake_options
         {.name = "quality", .argument = "draft|medium|high", .kind = CLI_CHOICE, .target = &o->quality,
          .help = "presets of the next two: 64, 256 or 1024 samples, noise 0.05, 0.02 or 0.01 (default medium)"},
         {.name = "samples", .argument = "N", .kind = CLI_UINT, .target = &o->samples, .min = 1, .max = samples_max,
-         .help = "rays per texel at most; four times as many halve the noise"},
+         .help = "looks at each light source per texel at most, with four rays for bounced light for each; four times as many halve the noise"},
         {.name = "noise", .argument = "E", .kind = CLI_FLOAT, .target = &o->noise, .max = 1,
          .help = "where every layer's error is estimated below that, 0.02 meaning 2 %, no more samples are taken; 0: take them all"},
         {.name = "interpolation", .argument = "E", .kind = CLI_FLOAT, .target = &o->interpolation, .max = 1,
