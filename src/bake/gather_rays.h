@@ -88,8 +88,7 @@ static inline uint32_t lx_gather_pass_rays(uint32_t rays, uint32_t luxels)
 {
     enum { least = 16, usual = 64, enough = 1 << 24 }; // the last of all luxels together
     uint32_t count = least;
-    while (count < usual && 4 * count <= rays) count *= 2;
-    while (count < lx_gather_most_pass_rays && 4 * count < rays && (uint64_t)count * luxels < enough) count *= 2;
+    while (count < lx_gather_most_pass_rays && 4 * count < rays && (count < usual || (uint64_t)count * luxels < enough)) count *= 2;
     return count;
 }
 
