@@ -1,5 +1,6 @@
 """bench_bakes from Python: several bakes of one scene in turn, and the errors between them."""
 
+import itertools
 import json
 import math
 import os
@@ -74,6 +75,12 @@ class Bakes:
         # (G - P1)(G - P2) = b² - b (n1 + n2) + n1 n2: the last has variance noise² per value, the middle one 2 b² noise. Channels count as one value.
         spread = math.sqrt((noise ** 2 + 2 * max(0.0, square) * noise) / max(1, self.texels))
         return math.copysign(math.sqrt(abs(square)), square) / mean, math.sqrt(spread) / mean
+
+    def error_of(self, bakes, referees):
+        """Relative RMSE of bakes of one kind against referees with independent noise, two of these at a time: free of their noise in the mean."""
+        pairs = list(itertools.combinations(referees, 2))
+        square = sum(self.dot(k, p, k, q) for p, q in pairs for k in bakes) / len(pairs) / len(bakes)
+        return math.sqrt(max(0.0, square)) / self.mean(referees[0])
 
     def bias(self, pair, referees):
         """Relative RMSE between the means of two kinds of bakes, each made twice with independent noise, free of the noise of both; negative where noise made

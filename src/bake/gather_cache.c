@@ -48,10 +48,8 @@ static lx_gather_luxel describe(const lx_gather_job *g, lx_texel *t, uint32_t lu
     open_luxel(g, t, luxel);
     lx_gather_luxel out = {.albedo = mean_albedo(g, t), .centre = first_site->position, .texel_m = lx_texel_size(t)};
     out.reach = near_source_texels * out.texel_m;
-    for (uint32_t s = 0; s < g->bake->source_count; ++s) {
-        if (g->uses[s].layer < 0 || !lx_gather_is_near(g->bake->tracer, &out, s)) continue;
-        out.near_sources |= (uint64_t)1 << s % 64;
-    }
+    for (uint32_t s = 0; s < g->bake->source_count; ++s)
+        if (g->uses[s].layer >= 0 && lx_gather_is_near(g->bake->tracer, &out, s)) out.near_sources |= (uint64_t)1 << s % 64;
     return out;
 }
 

@@ -644,8 +644,8 @@ static size_t look_into_cell(const job *j, uint32_t luxel, uint32_t slot, uint32
     const lx_direct_tile *tile = j->tile;
     const bool alone = tile->alone && tile->alone[luxel];
     const float per_ray = lx_sky_per_ray(&tile->sky_cells[luxel], cell), rays = (float)(lx_rays_per_sample * j->samples) / (float)tile->sky_cell_count;
-    const bool is_left_to_rays = per_ray == 0 && !alone;
-    const uint32_t wanted = (uint32_t)(rays * (per_ray > 0 ? per_ray : 1.0f / lx_rays_per_sample)), samples = is_left_to_rays ? 0 : wanted > 1 ? wanted : 1;
+    if (per_ray == 0 && !alone) return count; // gather rays tell enough
+    const uint32_t wanted = (uint32_t)(rays * (per_ray > 0 ? per_ray : 1.0f / lx_rays_per_sample)), samples = wanted > 1 ? wanted : 1;
     const uint32_t stream = lx_hash_combine(tile->stream[luxel], j->key), key = lx_hash_combine(stream, cell);
     const float share = alone ? 1 : lx_sky_samples_share(per_ray);
     for (uint32_t i = 0; i < samples; ++i) {

@@ -314,7 +314,6 @@ static void paths_take_no_samples_of_a_uniform_sky(void **state)
     end(&f);
 }
 
-// A chink that few rays find: its light must not be taken for none.
 // Four times the samples for each time that a lamp is twice as near, from where its light is hundreds of times the mean.
 static void places_beside_a_lamp_deserve_more_samples(void **state)
 {
@@ -336,6 +335,7 @@ static void places_beside_a_lamp_deserve_more_samples(void **state)
     end(&f);
 }
 
+// A chink that few rays find: its light must not be taken for none.
 static void a_sliver_of_sky_is_not_lost(void **state)
 {
     (void)state;
